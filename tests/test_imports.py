@@ -30,7 +30,6 @@ DATA = {"BaseModel", "BaseSettings", "Model", "Record", "IntEnum", "Enum", "Prot
 # Classes that are larger, each with the reason why it is one all the same.
 LARGE_CLASSES = {
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
-    "service.bench.scale_model._Simulation": "not parted yet",
 }
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.

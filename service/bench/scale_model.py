@@ -12,6 +12,7 @@ import itertools
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -135,12 +136,70 @@ class _Assistant:
     busy_s: float = 0.0
 
 
+class _Clock:
+    """Simulated time, and what is to happen when; at one time in the order in which it was planned."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self._planned: list[tuple[float, int, Callable[[], None]]] = []
+        self._order = itertools.count()
+
+    def at(self, when: float, act: Callable[[], None]) -> None:
+        heapq.heappush(self._planned, (when, next(self._order), act))
+
+    def advance(self) -> bool:
+        """Have the next thing happen; False where nothing is planned."""
+        if not self._planned:
+            return False
+        self.now, _, act = heapq.heappop(self._planned)
+        act()
+        return True
+
+
+class _FrontDoor:
+    """The host through which all messages go. Those that hold no result take no time on the links."""
+
+    def __init__(self, network: Network, clock: _Clock) -> None:
+        self._network, self._clock = network, clock
+        self.into, self.processor, self.out = _Queue(), _Queue(), _Queue()
+
+    def pass_lease(self, then: Callable[[], None]) -> None:
+        """From the home to an assistant, where `then` happens."""
+        net, clock = self._network, self._clock
+
+        def at_door() -> None:
+            clock.at(self.processor.take(clock.now, net.door_message_s) + net.latency_s, then)
+
+        clock.at(clock.now + net.latency_s, at_door)
+
+    def pass_result(self, link: _Queue, size: int, then: Callable[[], None]) -> None:
+        """From the assistant's link into the door's, through the door, out of it, and into the home's, where `then`
+        happens. The parts of a message follow each other, so that two links with nothing else to do take the time of
+        one."""
+        net, clock = self._network, self._clock
+        link_s = size / net.bytes_per_s
+
+        def at_door() -> None:
+            clock.at(self.into.take(clock.now - link_s, link_s), in_door)
+
+        def in_door() -> None:
+            clock.at(self.processor.take(clock.now, net.door_message_s + size * net.door_byte_s), out_of_door)
+
+        def out_of_door() -> None:
+            clock.at(self.out.take(clock.now, link_s) + net.latency_s, then)
+
+        clock.at(link.take(clock.now, link_s) + net.latency_s, at_door)
+
+
 class _Simulation:
+    """The home's policy and what the assistants do with their leases."""
+
     def __init__(self, costs: Costs, network: Network, work: Work, renderers: int) -> None:
-        self._costs, self._network, self._work = costs, network, work
+        self._costs, self._work = costs, work
+        self._clock = _Clock()
+        self._door = _FrontDoor(network, self._clock)
         self._renderers = renderers
         self._assistants = [_Assistant() for _ in range(renderers - 1)]
-        self._into_door, self._door, self._out_of_door = _Queue(), _Queue(), _Queue()
         self._ledger = Ledger(work.width, work.height, work.samples, itertools.count())
         self._since = min(border_after(0), work.samples)  # the home traces the first block alone
         self._left_s = self._since * work.pixels * costs.sample_s  # of what the home traces now
@@ -148,29 +207,22 @@ class _Simulation:
         self._inbox: deque[int] = deque()
         self._working = self._ended = False
         self._traced_s = self._written_s = self._merged_s = 0.0
-        self._now = 0.0
-        self._events: list[tuple[float, int, Callable[[], None]]] = []
-        self._order = itertools.count()
 
     def run(self) -> Outcome:
         self._give()
         self._wake()
-        while self._events and not self._ended:
-            self._now, _, act = heapq.heappop(self._events)
-            act()
+        while not self._ended and self._clock.advance():
+            pass
         assert self._ended, "the simulated render has come to a standstill"
         busy = {
             "tracing": self._traced_s + sum(each.busy_s for each in self._assistants),
             "home": self._traced_s + self._written_s + self._merged_s,
             "home's merging": self._written_s + self._merged_s,
-            "link": max(self._into_door.busy_s, self._out_of_door.busy_s),
-            "front door": self._door.busy_s,
+            "link": max(self._door.into.busy_s, self._door.out.busy_s),
+            "front door": self._door.processor.busy_s,
         }
         busy["tracing"] /= self._renderers
-        return Outcome(self._now, {name: seconds / self._now for name, seconds in busy.items()})
-
-    def _at(self, when: float, act: Callable[[], None]) -> None:
-        heapq.heappush(self._events, (when, next(self._order), act))
+        return Outcome(self._clock.now, {name: seconds / self._clock.now for name, seconds in busy.items()})
 
     # The home.
 
@@ -186,7 +238,7 @@ class _Simulation:
             self._wake()
 
         self._working = True
-        self._at(self._now + seconds, done)
+        self._clock.at(self._clock.now + seconds, done)
 
     def _step(self) -> None:
         """What the home does next: take a result, trace a slice, merge, or wait."""
@@ -247,19 +299,14 @@ class _Simulation:
             for number, assistant in enumerate(self._assistants):
                 if self._ledger.count(number) >= EACH:
                     continue
-                given = self._ledger.lease(number, self._since, self._costs.sample_s, self._renderers, self._now)
+                given = self._ledger.lease(
+                    number, self._since, self._costs.sample_s, self._renderers, self._clock.now
+                )
                 if given is None:
                     return
-                self._send_lease(assistant, given)
+                self._door.pass_lease(partial(self._hear_lease, assistant, given))
 
-    # The way between them. Messages that hold no result take no time on the links.
-
-    def _send_lease(self, assistant: _Assistant, lease: tuple[int, Band]) -> None:
-        def at_door() -> None:
-            handed = self._door.take(self._now, self._network.door_message_s)
-            self._at(handed + self._network.latency_s, lambda: self._hear_lease(assistant, lease))
-
-        self._at(self._now + self._network.latency_s, at_door)
+    # The assistants.
 
     def _hear_lease(self, assistant: _Assistant, lease: tuple[int, Band]) -> None:
         assistant.leases.append(lease)
@@ -275,31 +322,15 @@ class _Simulation:
 
         def traced() -> None:
             assistant.tracing = False
-            self._send_result(assistant, number, PIXEL_BYTES * self._work.width * band.rows)
+            size = PIXEL_BYTES * self._work.width * band.rows
+            self._door.pass_result(assistant.link, size, lambda: self._hear_result(number))
             self._assist(assistant)
 
-        self._at(self._now + seconds, traced)
+        self._clock.at(self._clock.now + seconds, traced)
 
-    def _send_result(self, assistant: _Assistant, number: int, size: int) -> None:
-        """From the assistant's link into the door's, through the door, out of it, and into the home's. The parts of a
-        message follow each other, so that two links with nothing else to do take the time of one."""
-        net = self._network
-        link_s = size / net.bytes_per_s
-
-        def at_door() -> None:
-            self._at(self._into_door.take(self._now - link_s, link_s), in_door)
-
-        def in_door() -> None:
-            self._at(self._door.take(self._now, net.door_message_s + size * net.door_byte_s), out_of_door)
-
-        def out_of_door() -> None:
-            self._at(self._out_of_door.take(self._now, link_s) + net.latency_s, at_home)
-
-        def at_home() -> None:
-            self._inbox.append(number)
-            self._wake()
-
-        self._at(assistant.link.take(self._now, link_s) + net.latency_s, at_door)
+    def _hear_result(self, number: int) -> None:
+        self._inbox.append(number)
+        self._wake()
 
     def _seconds(self, band: Band) -> float:
         return band.rows * band.count * self._work.width * self._costs.sample_s
