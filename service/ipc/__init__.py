@@ -1,8 +1,8 @@
 """What the server and the renderer's process say to each other.
 
-messages   the messages in both directions; immutable
-orders     those that tell a task to stand still, to end or to be saved
-leases     those by which a picture is divided among renderers
-channel    datagrams with arrays in shared memory beside them
-heartbeat  a counter in shared memory, by which the server sees that the renderer still works
+messages      the messages in both directions; immutable
+task_control  those by which a task stands still, goes on, ends or is saved
+leases        those by which a picture is divided among renderers
+channel       datagrams with arrays in shared memory beside them
+heartbeat     a counter in shared memory, by which the server sees that the renderer still works
 """

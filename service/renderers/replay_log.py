@@ -26,7 +26,7 @@ from service.ipc.messages import (
     Update,
     Want,
 )
-from service.ipc.orders import Pause, Resume, Settle, Stop
+from service.ipc.task_control import Pause, Resume, Settle, Stop
 from service.renderers.working_states import WorkingStates
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 from service.ipc.messages import Checkpoint, Done, Progress, Restore
-from service.ipc.orders import CheckpointStored
+from service.ipc.task_control import CheckpointStored
 from service.problems import Internal, ServiceError
 from service.renderers.protocol import Renderers
 from service.renders.store.pictures import Kind

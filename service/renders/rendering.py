@@ -19,7 +19,7 @@ from service.ipc.messages import (
     Progressed,
     Restore,
 )
-from service.ipc.orders import Stop, TakeCheckpoint
+from service.ipc.task_control import Stop, TakeCheckpoint
 from service.problems import Gone, Internal, ServiceError, Unavailable, answer
 from service.renderers.protocol import Listener
 from service.renders.life import Tracing

@@ -19,7 +19,7 @@ from service.ipc.messages import (
     Loaded,
     Update,
 )
-from service.ipc.orders import Hold, Pause, Resume, Stop
+from service.ipc.task_control import Hold, Pause, Resume, Stop
 from service.problems import Conflict, Internal, MalformedJson, ServiceError, answer, problem
 from service.renderers.protocol import Renderers
 from service.renders.status import error_of

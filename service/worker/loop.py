@@ -29,7 +29,7 @@ from service.ipc.messages import (
     Usage,
     Want,
 )
-from service.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.ipc.task_control import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.worker.bsdf_task import BsdfTask
 from service.worker.context import WorkerContext
 from service.worker.device.memory import Memory

@@ -18,7 +18,7 @@ from gpu import Renderer, RenderSettings, Scene, SceneEdit
 from gpu.kernels import features
 from gpu.precompile import fallback
 from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
-from service.ipc.orders import Pause
+from service.ipc.task_control import Pause
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene

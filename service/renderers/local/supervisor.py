@@ -10,7 +10,7 @@ from typing import Any
 
 from service.ipc import channel
 from service.ipc.messages import EvaluateBsdf, Read, Restore, SavedPicture, ToRenderer, Update
-from service.ipc.orders import Drop
+from service.ipc.task_control import Drop
 from service.problems import Unavailable
 from service.renderers.local.keeper import CLOSING
 from service.renderers.local.process import Options, Process, Start

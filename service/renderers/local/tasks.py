@@ -21,7 +21,7 @@ from service.ipc.messages import (
     Progressed,
     Usage,
 )
-from service.ipc.orders import Drop
+from service.ipc.task_control import Drop
 from service.renderers.local.keeper import Keeper
 from service.renderers.local.process import Cause, RendererProcess, Start
 from service.renderers.local.restarts import BY_OTHERS

@@ -11,7 +11,7 @@ from typing import Protocol
 from service.ipc.channel import Encoded
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted, undivided
 from service.ipc.messages import Done, Failed, Heard, ToRenderer, Update
-from service.ipc.orders import Drop, Pause, Resume, Stop
+from service.ipc.task_control import Drop, Pause, Resume, Stop
 
 log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from service.ipc import channel
 from service.ipc.messages import FromRenderer, ToRenderer, Unable, Update
-from service.ipc.orders import Drop, TakeCheckpoint
+from service.ipc.task_control import Drop, TakeCheckpoint
 from service.renderers.local.process import Waiting
 from service.renderers.ray.carriage import LARGE, Scenes, size, stored
 from service.renderers.ray.code import difference

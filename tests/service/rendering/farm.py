@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from service.ipc.messages import Checkpoint, Done, Image, Progress, Read, Reason, Restore, SavedPicture, Update
-from service.ipc.orders import Stop, TakeCheckpoint
+from service.ipc.task_control import Stop, TakeCheckpoint
 from service.problems import Unavailable
 from service.renders.store.store import RenderStore
 from tests.service.rendering.fakes import Renderers

@@ -29,7 +29,7 @@ from service.ipc.messages import (
     StopRule,
     Update,
 )
-from service.ipc.orders import CheckpointStored, Stop
+from service.ipc.task_control import CheckpointStored, Stop
 from service.renderers.local.supervisor import Supervisor
 from service.renders.recorder import Recorder
 from service.renders.store.store import RenderStore

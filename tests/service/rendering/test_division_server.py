@@ -13,7 +13,7 @@ from gpu import SceneEdit
 from service.ipc.channel import Encoded
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
-from service.ipc.orders import Drop, Pause, Resume
+from service.ipc.task_control import Drop, Pause, Resume
 from service.renderers.pool.division import Division
 
 SCENE = cast(Any, "a scene")

@@ -10,7 +10,7 @@ import pytest
 
 from gpu import Renderer, SceneEdit
 from service.ipc.messages import FromRenderer, StopRule, Update
-from service.ipc.orders import Pause
+from service.ipc.task_control import Pause
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.statistics import Kind

@@ -23,7 +23,7 @@ from service.ipc.messages import (
     Update,
     View,
 )
-from service.ipc.orders import Stop, TakeCheckpoint
+from service.ipc.task_control import Stop, TakeCheckpoint
 from service.pack import Packed
 from service.problems import Conflict, Internal
 from service.renders.job import Job

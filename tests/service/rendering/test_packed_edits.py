@@ -14,7 +14,7 @@ import pytest
 from gpu import Renderer, SceneEdit
 from service.ipc import messages
 from service.ipc.messages import Done, Frame, Image, Loaded, Read, StopRule, Update, View, Want
-from service.ipc.orders import Hold
+from service.ipc.task_control import Hold
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene

@@ -23,7 +23,7 @@ from service.ipc.messages import (
     View,
     Want,
 )
-from service.ipc.orders import Pause, Resume, Settle
+from service.ipc.task_control import Pause, Resume, Settle
 from service.problems import Unavailable
 from service.renderers.local.process import Waiting
 from service.renderers.pool.pool import Pool, Seat

@@ -9,7 +9,7 @@ import pytest
 
 from service.ipc import channel
 from service.ipc.messages import Failed, Loaded, StopRule, Update
-from service.ipc.orders import Settle
+from service.ipc.task_control import Settle
 from service.renderers.replay_log import ReplayLog
 from service.renderers.working_states import MOST
 

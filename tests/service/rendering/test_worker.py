@@ -31,7 +31,7 @@ from service.ipc.messages import (
     View,
     Want,
 )
-from service.ipc.orders import Drop, Hold, Pause, Resume, Stop
+from service.ipc.task_control import Drop, Hold, Pause, Resume, Stop
 from service.pack import pack
 from service.problems import Unavailable
 from service.renderers.local.process import Options

@@ -1,4 +1,4 @@
-"""Orders to the renderer's process, each of which concerns one task."""
+"""Messages to the renderer's process that control one task, as a shell controls its jobs."""
 
 from __future__ import annotations
 
