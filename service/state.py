@@ -158,17 +158,20 @@ def app_state(connection: HTTPConnection) -> AppState:
 
 
 def caller_of(connection: HTTPConnection) -> str:
-    """Whose limits a request counts towards: the owner of its key, or without keys the address's network."""
+    """The caller, to whose limits a request counts: the owner of its key, or without keys the address's network.
+
+    A client is one program or page at its connection; callers may have several.
+    """
     found: str = connection.scope.get("caller", "")
     return found
 
 
 def owner_of(connection: HTTPConnection) -> str:
-    """The owner of the request's key, as the guard named it; "" where no keys are needed."""
+    """The owner of what the request makes, by its key; "" where no keys are needed: it is everybody's."""
     found: str = connection.scope.get("owner", "")
     return found
 
 
 def bodiless(connection: HTTPConnection) -> bool:
-    """Whether the caller asked for the head of the answer only."""
+    """Whether the request is for the head of the answer only."""
     return bool(connection.scope.get("bodiless", False))

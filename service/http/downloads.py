@@ -1,6 +1,6 @@
 """Large answers: sent in pieces, as the client takes them, from files and not from memory.
 
-Pictures are encoded one at a time for each client, so that a client that requests many delays only itself.
+Pictures are encoded one at a time for each caller, so that a caller that requests many delays only itself.
 """
 
 from __future__ import annotations
@@ -110,14 +110,14 @@ class Downloads:
         self._shares = Shares(ROOM, "pictures that are being sent", retry_s=RETRY_S)  # bytes on the disk
 
     @asynccontextmanager
-    async def turn(self, client: str) -> AsyncIterator[None]:
-        """Wait for the client's turn to have a picture written: each client has one at a time."""
-        mine = self._turns.setdefault(client, asyncio.Lock())
+    async def turn(self, caller: str) -> AsyncIterator[None]:
+        """Wait for the caller's turn to have a picture written: each caller has one at a time."""
+        mine = self._turns.setdefault(caller, asyncio.Lock())
         async with mine, self._room:
             yield
 
     async def answer(
-        self, client: str, data: bytes, media_type: str, headers: Mapping[str, str] | None = None
+        self, caller: str, data: bytes, media_type: str, headers: Mapping[str, str] | None = None
     ) -> Response:
         """An answer that takes little memory: a large one is sent from a file. Raises Unavailable."""
         if len(data) <= PIECE:
@@ -126,21 +126,21 @@ class Downloads:
         def fill(file: BinaryIO) -> None:
             file.write(data)
 
-        self.admit(client, len(data))
+        self.admit(caller, len(data))
         written = await asyncio.to_thread(self.write, fill)
-        self.keep(client, None, written)
+        self.keep(caller, None, written)
         return FileAnswer(written.file, media_type, headers or {}, written)
 
     def find(self, key: Hashable) -> Written | None:
         """A picture that is still being sent to somebody."""
         return self._written.get(key)
 
-    def admit(self, client: str, most_bytes: int) -> None:
-        """Raise TooManyRequests or Unavailable where `size` more bytes exceed the client's share or the room of all.
+    def admit(self, caller: str, most_bytes: int) -> None:
+        """Raise TooManyRequests or Unavailable where `most_bytes` more exceed the caller's share or the room of all.
 
         A picture of more than a quarter of the room counts as a quarter, so that pictures of any size can be sent.
         """
-        self._shares.check(client, min(most_bytes, ROOM // 4))
+        self._shares.check(caller, min(most_bytes, ROOM // 4))
 
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
         """A file that `fill` has written. For any thread. Raises Unavailable where the disk is full."""
@@ -163,9 +163,9 @@ class Downloads:
                 raise
             return tempfile.TemporaryFile()
 
-    def keep(self, client: str, key: Hashable | None, written: Written) -> None:
+    def keep(self, caller: str, key: Hashable | None, written: Written) -> None:
         """Count a picture while it is being sent; with `key`, `find` leads other requests to it."""
         if key is not None:
             self._written[key] = written
-        self._shares.count(client, written.bytes)
-        weakref.finalize(written, self._shares.release, client, written.bytes)
+        self._shares.count(caller, written.bytes)
+        weakref.finalize(written, self._shares.release, caller, written.bytes)

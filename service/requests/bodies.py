@@ -19,8 +19,8 @@ from service.system.memory import Limit, MemoryBudget
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
-# Bytes that are parsed in some ms: handing them to another process would take as long. So few are not counted either:
-# as many as there may be connections take less than two of the largest bodies.
+# Bytes that are parsed in some ms: sending them to another process would take as long. Nor are so few counted: one
+# such body for each connection takes less than two of the largest bodies.
 SMALL = 64 * 1024
 AT_ONCE = 4  # as many of the largest bodies may wait, two of one caller
 
@@ -34,14 +34,14 @@ class Bodies:
         self._pool = ParserPool(config, self._memory)
         self._limit = Limit("bodies", AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")
 
-    async def parsed(self, kind: Kind, body: bytearray, client: str = "", counted: bool = False) -> Any:
+    async def parsed(self, kind: Kind, body: bytearray, caller: str = "", counted: bool = False) -> Any:
         """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
 
-        Turns go round the clients. `counted`: the caller has counted what `memory_for` says.
+        Turns go round the callers. `counted`: the bytes of `memory_for` count already.
         """
         if len(body) <= SMALL:
-            return await parsing(partial(PARSERS[kind], self._config, body), client)
-        return await waiting_for_parsers(partial(self._pool.parse, kind, body, counted), client)
+            return await parsing(partial(PARSERS[kind], self._config, body), caller)
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body, counted), caller)
 
     @staticmethod
     def memory_for(body: bytearray) -> int:
@@ -57,9 +57,9 @@ class Bodies:
 
         Raises UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
         """
-        told = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-        if told not in TAKEN and not told.endswith("+json"):
-            raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
+        type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if type not in TAKEN and not type.endswith("+json"):
+            raise UnsupportedMedia(f"{type[:100]!r} is not taken here: send application/json")
         body, received = bytearray(), 0
         with self._memory.growing(self._limit) as hold:
             async for chunk in request.stream():

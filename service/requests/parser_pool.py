@@ -56,7 +56,7 @@ class ParserPool:
     def parse(self, kind: Kind, body: bytearray, counted: bool = False) -> Any:
         """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time.
 
-        `counted`: the caller has counted the memory that it takes."""
+        `counted`: the memory that this takes counts already."""
         needed, most = most_bytes(body), self._config.max_json_memory
         if needed > most:
             detail = f"What this body holds may take {needed // MIB} MiB of memory: no more than {most // MIB} MiB"

@@ -240,17 +240,17 @@ async def delete(request: Request, id: answers.RenderId) -> None:
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
     state, downloads = app_state(request), app_state(request).downloads
-    client = caller_of(request)
+    caller = caller_of(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
-    async with present(request.receive) as gone, downloads.turn(client):
+    async with present(request.receive) as gone, downloads.turn(caller):
         if gone():
             return Response(status_code=GONE)
         written = downloads.find(key)
         if written is None:
-            downloads.admit(client, _most_bytes(job, query))
+            downloads.admit(caller, _most_bytes(job, query))
             with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
                 written = await _written(downloads, job, query, view)
-            downloads.keep(client, key, written)
+            downloads.keep(caller, key, written)
     return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
 
 

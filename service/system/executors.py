@@ -31,15 +31,15 @@ def _yield_to_others(niceness: int = NICENESS) -> None:
 class _Work:
     run: Callable[[], Any]
     result: Future[Any]
-    client: str
+    caller: str
 
 
 class Pool:
-    """Threads for one kind of work, which waits for no other kind: `await pool(work, client)`.
+    """Threads for one kind of work, which waits for no other kind: `await pool(work, caller)`.
 
-    Turns go round the clients that have work here, and then in the order of arrival: one client with much work delays
-    itself. No client has more than `each` threads at a time: work of minutes is for fewer than all threads, or else
-    nobody had a turn until it ended.
+    Turns go round the callers that have work here, and then in the order of arrival: a caller with much work delays
+    itself alone. None has more than `each` threads at a time: if work of minutes took all of them, nobody else would
+    have a turn until it ended.
     """
 
     def __init__(self, name: str, threads: int, niceness: int = 0, each: int | None = None) -> None:
@@ -47,17 +47,17 @@ class Pool:
         self._most = threads
         self._each = threads if each is None else each
         self._lock = threading.Lock()
-        self._waiting = dict[str, deque[_Work]]()  # by client; the first one's turn is next
-        self._running: Counter[str] = Counter()  # works, by client
+        self._waiting = dict[str, deque[_Work]]()  # by caller; the first one's turn is next
+        self._running: Counter[str] = Counter()  # works, by caller
         self._busy = 0  # threads that have work, or look for some
 
-    async def __call__(self, work: Callable[[], T], client: str | None = None) -> T:
-        """The result of `work`, in the caller's context. `client` is by default the caller that it is for."""
-        client = CALLER.get() if client is None else client
+    async def __call__(self, work: Callable[[], T], caller: str | None = None) -> T:
+        """The result of `work`, in the context of this call. `caller` is by default that of the work at hand."""
+        caller = CALLER.get() if caller is None else caller
         context, result = copy_context(), Future[T]()
-        context.run(CALLER.set, client)
+        context.run(CALLER.set, caller)
         with self._lock:
-            self._waiting.setdefault(client, deque()).append(_Work(partial(context.run, work), result, client))
+            self._waiting.setdefault(caller, deque()).append(_Work(partial(context.run, work), result, caller))
             if self._busy < self._most:
                 self._busy += 1
                 self._threads.submit(self._work)
@@ -71,20 +71,20 @@ class Pool:
                 except BaseException as error:
                     work.result.set_exception(error)
             with self._lock:
-                self._running[work.client] -= 1
+                self._running[work.caller] -= 1
 
     def _next(self) -> _Work | None:
-        """The work whose turn it is; None where no client may have another thread."""
+        """The work whose turn it is; None where no caller may have another thread."""
         with self._lock:
-            client = next((each for each in self._waiting if self._running[each] < self._each), None)
-            if client is None:
+            caller = next((each for each in self._waiting if self._running[each] < self._each), None)
+            if caller is None:
                 self._busy -= 1
                 return None
-            works = self._waiting.pop(client)
+            works = self._waiting.pop(caller)
             work = works.popleft()
             if works:
-                self._waiting[client] = works  # behind the others
-            self._running += Counter([client])  # which drops those that have none
+                self._waiting[caller] = works  # behind the others
+            self._running += Counter([caller])  # which drops those that have none
             return work
 
 

@@ -201,9 +201,9 @@ class RenderStore:
         for _, id in stored:
             await self._on_disk(partial(self._files.delete, id), _pool(self._files.size(id)))
 
-    async def _on_disk(self, work: Callable[[], T], pool: Pool, client: str = "") -> T:
+    async def _on_disk(self, work: Callable[[], T], pool: Pool, caller: str = "") -> T:
         try:
-            return await pool(work, client)
+            return await pool(work, caller)
         except ServiceError:
             raise
         except OSError as error:
