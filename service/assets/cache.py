@@ -24,14 +24,14 @@ class ParsedCache:
     def __init__(self, limits: AssetLimits) -> None:
         self.sandbox = Sandbox(limits)
         self._lock = threading.Lock()
-        self._kept: OrderedDict[str, Parsed] = OrderedDict()
-        self._large: tuple[str, Parsed] | None = None  # which goes with its first use
+        self._cached: OrderedDict[str, Parsed] = OrderedDict()
+        self._large: tuple[str, Parsed] | None = None  # dropped at its first use
         self._pending: dict[str, Future[Parsed]] = {}
 
     def load(self, key: str, parse: Callable[[], Parsed], ahead: bool = False) -> Parsed:
-        """The result of `parse` for this key, now or before. Raises what it raises; failures are not cached.
+        """The result of `parse` for this key, now or earlier. Raises its exceptions; failures are not cached.
 
-        `ahead`: it will be used by the next call with this key, for which it stays however large it is.
+        `ahead`: the next call with this key will use it; until then it stays, however large it is.
         """
         with self._lock:
             if self._large is not None and self._large[0] == key:
@@ -39,9 +39,9 @@ class ParsedCache:
                 if not ahead:
                     self._large = None
                 return parsed
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
+            if key in self._cached:
+                self._cached.move_to_end(key)
+                return self._cached[key]
             future = self._pending.get(key)
             if future is None:
                 mine = self._pending[key] = Future()
@@ -55,30 +55,30 @@ class ParsedCache:
             mine.set_exception(error)
             raise
         with self._lock:
-            self._keep(key, parsed, ahead)
+            self._cache(key, parsed, ahead)
             del self._pending[key]
         mine.set_result(parsed)
         return parsed
 
-    def _keep(self, key: str, parsed: Parsed, ahead: bool) -> None:
+    def _cache(self, key: str, parsed: Parsed, ahead: bool) -> None:
         if _bytes(parsed) > self.sandbox.limits.cache_bytes:
             self._large = (key, parsed) if ahead else self._large
             return
-        self._kept[key] = parsed
-        room = self.sandbox.limits.cache_bytes - sum(map(_bytes, self._kept.values()))
+        self._cached[key] = parsed
+        room = self.sandbox.limits.cache_bytes - sum(map(_bytes, self._cached.values()))
         while room < 0:
-            room += _bytes(self._kept.popitem(last=False)[1])
+            room += _bytes(self._cached.popitem(last=False)[1])
 
     @property
     def bytes(self) -> int:
         with self._lock:
-            return sum(map(_bytes, self._kept.values())) + (_bytes(self._large[1]) if self._large else 0)
+            return sum(map(_bytes, self._cached.values())) + (_bytes(self._large[1]) if self._large else 0)
 
     def shrink(self, size: int) -> None:
-        """Free that many bytes, or all that there are, beginning with the asset that was loaded longest ago."""
+        """Free that many bytes, or all, beginning with the asset that was loaded longest ago."""
         with self._lock:
-            while size > 0 and self._kept:
-                size -= _bytes(self._kept.popitem(last=False)[1])
+            while size > 0 and self._cached:
+                size -= _bytes(self._cached.popitem(last=False)[1])
             if size > 0:
                 self._large = None
 

@@ -48,8 +48,8 @@ class FileAssets:
         """Whether such a file exists. Raises AssetError for a path that may not be read."""
         return _exists(self._find(ref))
 
-    def keep(self, ref: str) -> None:
-        """Copies a file into the store. Raises AssetError, Unavailable."""
+    def add(self, ref: str) -> None:
+        """Copy a file into the store. Raises AssetError, Unavailable."""
         data, parsed = self.read(ref), self._load(ref)
         # Under the id that the store will ask for: a file is parsed once.
         self._loader.load("sha256:" + hashlib.sha256(data).hexdigest(), lambda: parsed)

@@ -47,18 +47,18 @@ class Imported:
 
     def references(self) -> set[str]:
         """The assets that the document needs."""
-        held = [*self.document["shapes"], *self.document.get("textures", {}).values()]
-        return {one["asset"] for one in held}
+        parts = [*self.document["shapes"], *self.document.get("textures", {}).values()]
+        return {one["asset"] for one in parts}
 
 
-def take_apart(file: SceneFile, keep: Callable[[ScenePart], str]) -> Imported:
-    """`keep` stores a part and returns its id. Raises AssetError, and the exceptions of `keep`."""
+def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
+    """Store the parts of a scene by `store`, which returns their ids. Raises AssetError, and what `store` raises."""
     from service.scene import parse_scene  # a quarter of a second, which each parsing child would wait for, too
 
     ids: list[str] = []
     for part in file.parts:
         try:
-            ids.append(keep(part))
+            ids.append(store(part))
         except AssetError as error:
             raise AssetError(f"{part.pointer}: {error.detail}", part.pointer) from None
 

@@ -1,4 +1,4 @@
-"""The bytes of an asset: in memory, or in a file, of which then none need be in the service's memory."""
+"""The bytes of an asset: in memory, or in a file, which need not be read into the service's memory."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def format_of(source: Source, content_type: str | None = None, filename: str | N
         return sniff(view, content_type, filename)
 
 
-def handed(source: Source) -> bytes | int:
-    """As the sandbox takes it."""
+def for_sandbox(source: Source) -> bytes | int:
+    """The bytes or the descriptor, for `Sandbox.parse`."""
     if isinstance(source, bytes | memoryview):
         return bytes(source)
     return source.fileno()

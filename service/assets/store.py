@@ -19,7 +19,7 @@ from service.assets.formats import KINDS, sniff
 from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
 from service.assets.scenes.plain_mesh import plain_scene
-from service.assets.source import Source, digest, format_of, handed, length
+from service.assets.source import Source, digest, for_sandbox, format_of, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from service.system.confined import Rights
@@ -61,7 +61,7 @@ class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
     `builtin` returns built-in assets by id; it is called when one of them is first requested.
-    `room` is a context for storing files: it gets the disk space that they take, and raises where that is too much.
+    `room` is a context for storing files: it is called with their disk space, and raises where that is too much.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class AssetStore:
         """Parse the bytes, and store them; they replace damaged ones of the same id.
 
         `room` is used instead of the store's own; errors call a scene's file `title`. Raises UnsupportedMedia,
-        AssetError, Unavailable, and what `room` raises.
+        AssetError, Unavailable, and the exceptions of `room`.
         """
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
@@ -126,8 +126,8 @@ class AssetStore:
         if info.kind == "image":
             raise NotFound(f"{id[:100]} is an image: only meshes and scene files can be shown as a scene")
         if info.kind == "mesh":
-            document, told = plain_scene(id, self.mesh(id))
-            said = [] if told is None else [{"pointer": "", "detail": told}]
+            document, remark = plain_scene(id, self.mesh(id))
+            said = [] if remark is None else [{"pointer": "", "detail": remark}]
             return Imported(document, [*said, *(info.warnings or ())], lit=False)
         imported = self._imported(id)
         if imported is None:  # the file itself still exists: import it again
@@ -211,7 +211,7 @@ class AssetStore:
     ) -> tuple[AssetInfo, Imported]:
         """Store the parts of a scene and its document, and the file itself if it is `new`."""
         try:
-            file = self.loader.sandbox.parse_scene(format, handed(data))
+            file = self.loader.sandbox.parse_scene(format, for_sandbox(data))
         except ParseError as error:
             raise refused(title, error) from None
         size = length(data)
@@ -219,7 +219,7 @@ class AssetStore:
         text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])
         parts = [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
         with room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
-            imported = take_apart(file, self._keep)
+            imported = take_apart(file, self._store_part)
             info = AssetInfo(
                 id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,
                 exposure=imported.exposure, aspect_ratio=imported.aspect_ratio, bounds=file.bounds,
@@ -231,7 +231,7 @@ class AssetStore:
                     self._files.put(id, {SCENE: imported.written()})
         return info, imported
 
-    def _keep(self, part: ScenePart) -> str:
+    def _store_part(self, part: ScenePart) -> str:
         """The id of a part of a scene, stored as an asset of its own.
 
         It does not wait for the disk, which takes 15 ms a part: scenes have thousands, and can be imported again.
@@ -294,7 +294,7 @@ class AssetStore:
     ) -> Parsed:
         def parse() -> Parsed:
             with opened() as source:
-                return self.loader.sandbox.parse(format, handed(source))
+                return self.loader.sandbox.parse(format, for_sandbox(source))
 
         try:
             return self.loader.load(id, parse, ahead)

@@ -36,7 +36,7 @@ class SourceAssets:
         for ref in references.references(scene):
             if not ref.startswith("sha256:"):
                 try:
-                    self._found.keep(ref)
+                    self._found.add(ref)
                 except (ServiceError, OSError) as error:  # another user's folder may not even be listed
                     log.warning("asset not kept", {"ref": ref, "error": error})
 

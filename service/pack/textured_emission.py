@@ -35,7 +35,7 @@ def _pixels(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     """(height, width, channels): the pixels of an image, or the two fields of a checker."""
     if isinstance(use.texture, CheckerTexture):
         return np.array([[use.texture.a, use.texture.b]], np.float32)
-    return texels.places[use.kept][1].pixels
+    return texels.places[use.key][1].pixels
 
 
 def mean_emission(
@@ -95,7 +95,7 @@ def nearest(use: TextureReference, texels: PackedTexels, uv: np.ndarray) -> np.n
     if isinstance(use.texture, CheckerTexture):
         odd = np.floor(uv).sum(axis=1) % 2 != 0
         return np.where(odd[:, None], use.texture.b, use.texture.a).astype(np.float32)
-    pixels = texels.places[use.kept][1].pixels
+    pixels = texels.places[use.key][1].pixels
     if use.texture.wrap == "repeat":
         uv = uv - np.floor(uv)
     elif use.texture.wrap == "mirror":

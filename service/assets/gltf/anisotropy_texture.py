@@ -25,7 +25,7 @@ def rotation(textures: Textures, info: JsonView | None, name: str | None, turn: 
     if key not in textures.made:
         textures.made[key] = _made(np.asarray(pixels(textures, info)), math.degrees(turn))
         if isinstance(textures.made[key][0], bytes):
-            textures.made[key][0] = textures.keep(textures.made[key][0], info.pointer)
+            textures.made[key][0] = textures.store(textures.made[key][0], info.pointer)
     found, *factor = textures.made[key]
     if not factor:
         return found

@@ -34,10 +34,10 @@ def morphed(file: GltfDocument, primitive: Primitive, place: JsonView, weights: 
             if not weight or name not in target:
                 continue
             offsets = accessors.read(file, target, name, "VEC3")
-            if primitive.kept is not None:
-                if primitive.kept[-1] >= len(offsets):
+            if primitive.numbers is not None:
+                if primitive.numbers[-1] >= len(offsets):
                     raise target.error(name, f"has {len(offsets)} items, fewer than there are vertices")
-                offsets = offsets[primitive.kept]
+                offsets = offsets[primitive.numbers]
             if len(offsets) != len(rows):
                 raise target.error(name, f"has {len(offsets)} items for {len(rows)} vertices")
             moved[name] = rows + weight * offsets.astype(np.float64)

@@ -95,8 +95,8 @@ def embedded(place: JsonView) -> Bytes:
     """The bytes of a `data:` URI."""
     uri = place.text("uri")
     if not uri:
-        held = place.object("extensions")
-        names = sorted(held.value) if held else []
+        extensions = place.object("extensions")
+        names = sorted(extensions.value) if extensions else []
         which = f": its data are there in compressed form only ({names[0][:60]})" if names else ""
         raise place.error("uri", f"is missing{which}{remedy(names)}")
     head, comma, body = uri.partition(",")

@@ -36,7 +36,7 @@ class _Importer:
     def __init__(self, file: GltfDocument) -> None:
         self.file, self.notes, self.files = file, Warnings(), PartFiles()
         self.nodes = Nodes(file, self.notes)
-        self.textures = Textures(file, self.notes, self.files.keep)
+        self.textures = Textures(file, self.notes, self.files.add)
         self.materials = Materials(file, self.textures, self.notes)
         self.placements = Placements()
         self._held: set[str] = set()  # references of parts
@@ -67,14 +67,14 @@ class _Importer:
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
         lighting = Warnings()
-        told = stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
-        if told is not None:
-            lighting.add("", told)
+        remark = stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
+        if remark is not None:
+            lighting.add("", remark)
         exposure = self._metered(used, aspect, lighting) if lights else None
         warnings = [*lighting.document(), *self.notes.document()]  # warnings about the whole picture come first
         triangles = sum(part.triangles for part in self.placements.shown)
         bounds = [corner.tolist() for corner in around]
-        return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
+        return SceneFile(used, self.files.parts, warnings, triangles, bool(lights), exposure, aspect, bounds)
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:
         """The exposure that suits the file's lights, where 0 does not. It is noted, and so is that nothing else
@@ -84,8 +84,8 @@ class _Importer:
         stops = metering.exposure(document, self.placements.placed(), aspect)
         if stops is not None:
             side = "above" if stops < 0 else "below"
-            told = f"the file's lights expose the picture {abs(stops):g} stops {side} middle grey"
-            notes.add(place, f"{told}; they are kept as they are, and an exposure of {stops:g} suits them")
+            exposed = f"the file's lights expose the picture {abs(stops):g} stops {side} middle grey"
+            notes.add(place, f"{exposed}; they are kept as they are, and an exposure of {stops:g} suits them")
         notes.add(place, "the file has lights and no environment: there is no sky, and the background is empty")
         return stops
 
@@ -138,7 +138,7 @@ class _Importer:
                 raise _wrong(primitive, place, name, rows, bad[0], "is not finite")
         charts = [None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]]) for uv in primitive.uvs]
         data = ply(vertices, primitive.faces, primitive.normals, charts, primitive.colors, primitive.tangents)
-        reference = self.files.keep(data, place.pointer, len(vertices), len(primitive.faces))
+        reference = self.files.add(data, place.pointer, len(vertices), len(primitive.faces))
         self._triangles += 0 if reference in self._held else len(primitive.faces)
         self._held.add(reference)
         limit = self.file.limits.max_triangles
@@ -174,7 +174,7 @@ class _Importer:
 def _wrong(primitive: Primitive, place: JsonView, name: str, rows: Array, row: int, what: str) -> ParseError:
     """The refusal of a primitive for a row of its attribute `name`."""
     attributes = place.need("attributes")
-    item = int(row if primitive.kept is None else primitive.kept[row])
+    item = int(row if primitive.numbers is None else primitive.numbers[row])
     accessor = attributes.value.get(name)
     named = f"item {item} of /accessors/{accessor}" if type(accessor) is int else f"item {item}"
     return attributes.error(name, f"{named} {what}: {rows[row].tolist()}")

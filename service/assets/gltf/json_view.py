@@ -52,8 +52,8 @@ class JsonView:
             yield JsonView(one, f"{self.at(name)}/{k}")
 
     def extension(self, name: str) -> JsonView | None:
-        held = self.object("extensions")
-        return held.object(name) if held else None
+        extensions = self.object("extensions")
+        return extensions.object(name) if extensions else None
 
     def whole(self, name: str, default: int | None = None, low: int = 0) -> int:
         return whole(self.value.get(name, default), self.at(name), low)

@@ -24,12 +24,12 @@ def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[
         used = node.place.extension("KHR_lights_punctual")
         if used is None:
             continue
-        held = file.root.extension("KHR_lights_punctual")
-        listed = held.array("lights") if held else []
+        extension = file.root.extension("KHR_lights_punctual")
+        listed = extension.array("lights") if extension else []
         index = used.whole("light")
-        if held is None or index >= len(listed):
+        if extension is None or index >= len(listed):
             raise used.error("light", f"refers to light {index} of {len(listed)}")
-        found.append(_light(JsonView(listed[index], f"{held.at('lights')}/{index}"), node, notes))
+        found.append(_light(JsonView(listed[index], f"{extension.at('lights')}/{index}"), node, notes))
     return found
 
 

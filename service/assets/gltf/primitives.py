@@ -32,7 +32,7 @@ class Primitive:
     joints: tuple[Array, ...] = ()  # (n, 4) each
     weights: tuple[Floats, ...] = ()
     tangents: Array | None = None  # (n, 4)
-    kept: Longs | None = None  # the file's numbers of these vertices; None: all
+    numbers: Longs | None = None  # the file's numbers of these vertices; None: all
 
     def detail(self) -> Iterator[tuple[str, Array]]:
         """The attributes of its vertices besides the position, by name."""
@@ -65,20 +65,20 @@ class Primitive:
             return self
         number = np.cumsum(used, dtype=np.int32) - np.int32(1)
 
-        def kept(rows: Array | None) -> Array | None:
+        def some(rows: Array | None) -> Array | None:
             return None if rows is None else rows[used]
 
         return replace(
             self,
             vertices=self.vertices[used],
             faces=number[self.faces],
-            normals=kept(self.normals),
-            uvs=tuple(map(kept, self.uvs)),
-            colors=kept(self.colors),
-            tangents=kept(self.tangents),
+            normals=some(self.normals),
+            uvs=tuple(map(some, self.uvs)),
+            colors=some(self.colors),
+            tangents=some(self.tangents),
             joints=tuple(rows[used] for rows in self.joints),
             weights=tuple(rows[used] for rows in self.weights),
-            kept=np.flatnonzero(used),
+            numbers=np.flatnonzero(used),
         )
 
 

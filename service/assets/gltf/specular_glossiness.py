@@ -78,7 +78,7 @@ def _textured(read: MaterialReader, place: JsonView, factors: tuple[Any, Any, fl
     settings = {name: value for name, value in placings[0].items() if name not in ("asset", "color_space")}
     key = "specular glossiness", place.pointer
     if key not in textures.made:
-        textures.made[key] = [textures.keep(data, place.pointer) for data in _bake(read, place, factors)]
+        textures.made[key] = [textures.store(data, place.pointer) for data in _bake(read, place, factors)]
     texture = textures.file.follow(infos[0], "index", "textures")
     color, rough = textures.made[key]
     one = textures.add(color, {**settings, "color_space": "srgb"}, texture)

@@ -30,16 +30,15 @@ Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates 
 
 @dataclass
 class Textures:
-    """The textures of a file. `keep` stores an image, given its bytes and place; it returns the document's
-    reference."""
+    """The textures of a file. `store` stores an image, by its bytes and place, and returns its reference."""
 
     file: GltfDocument
     notes: Warnings
-    keep: Callable[[bytes, str], str]
+    store: Callable[[bytes, str], str]
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
     made: dict[tuple[str, str], list[Any]] = field(default_factory=dict)  # references to images of our own, and more
     _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
-    _kept: dict[str, str] = field(default_factory=dict)
+    _references: dict[str, str] = field(default_factory=dict)  # to images, by their place
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
     def use(self, info: JsonView | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
@@ -105,13 +104,13 @@ class Textures:
         place = self.source(texture)
         if place is None:
             return None
-        if place.pointer not in self._kept:
+        if place.pointer not in self._references:
             data = self.file.image(place)
             if sniff(data) not in READ:
                 at = "bufferView" if "bufferView" in place else "uri"
                 raise place.error(at, f"is not a PNG, JPEG or WebP image; it begins with {data[:12]!r}")
-            self._kept[place.pointer] = self.keep(data, place.pointer)
-        return self._kept[place.pointer]
+            self._references[place.pointer] = self.store(data, place.pointer)
+        return self._references[place.pointer]
 
     def channels(self, info: JsonView) -> str:
         """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" without an image that can be read."""

@@ -64,10 +64,10 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
         Placed(whole, mesh.faces[which].astype(np.int32), np.eye(4), True, shape["material"])
         for (_, which), shape in zip(_by_material(read), shapes, strict=True)
     ]
-    if (told := stand_inside(document, parts, bounds)) is not None:
-        notes.add(name, told)
+    if (remark := stand_inside(document, parts, bounds)) is not None:
+        notes.add(name, remark)
     corners = [corner.tolist() for corner in bounds]
-    return SceneFile(document, files.kept, notes.document(), len(mesh.faces), False, bounds=corners)
+    return SceneFile(document, files.parts, notes.document(), len(mesh.faces), False, bounds=corners)
 
 
 def read_zipped_obj(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
@@ -145,5 +145,5 @@ def _keep(files: PartFiles, mesh: RawMesh, which: Longs, pointer: str) -> dict[s
     if groups is not None and groups.min() == groups.max():
         groups = None
     data = ply(mesh.vertices[used], triangles, normals, [uvs], colors, groups=groups)
-    shape = {"type": "mesh", "asset": files.keep(data, pointer, len(used), len(triangles))}
+    shape = {"type": "mesh", "asset": files.add(data, pointer, len(used), len(triangles))}
     return shape | ({"smooth": False} if is_flat else {})

@@ -53,7 +53,7 @@ class Textures:
                 self.notes.add(found.place, f"the option {option} has a number beyond 1e9 and is ignored")
             elif values != (default, default):
                 settings[name] = list(values)
-        reference = self.files.keep(image, path)
+        reference = self.files.add(image, path)
         key = reference, repr(settings)
         if key not in self._names:
             self._names[key] = unique(path.rpartition("/")[2].rpartition(".")[0] or "texture", self.documents)

@@ -45,11 +45,11 @@ def parse_image(format: str, data: bytes, limits: AssetLimits) -> ImageData:
         texels, warnings = _pillow(format, data, limits)
         return ImageData(np.ascontiguousarray(texels), tuple(warnings))
     pixels = _openimageio(format, data, limits)
-    told = tuple(_header(format, data))
+    ignored = tuple(_header(format, data))
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
         raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
-    return ImageData(np.ascontiguousarray(pixels, np.float32), told)
+    return ImageData(np.ascontiguousarray(pixels, np.float32), ignored)
 
 
 def _header(format: str, data: bytes) -> Iterator[str]:

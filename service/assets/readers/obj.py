@@ -147,12 +147,12 @@ def _check(
 ) -> Longs:
     """The places of indices beyond `most`, which lead nowhere from here on; `have` is the number of rows so far."""
     beyond = np.flatnonzero(index > most)
-    told = beyond[index[beyond] != NOWHERE]
-    if len(told):
+    new = beyond[index[beyond] != NOWHERE]
+    if len(new):
         one, many = NAMES[keyword]
-        line = lines[np.searchsorted(np.cumsum(counts), told[0], "right")]
-        faults.append((int(line), f"{one} {index[told[0]]} does not exist; there are {have} {many}"))
-        index[told] = NOWHERE
+        line = lines[np.searchsorted(np.cumsum(counts), new[0], "right")]
+        faults.append((int(line), f"{one} {index[new[0]]} does not exist; there are {have} {many}"))
+        index[new] = NOWHERE
     return beyond
 
 
@@ -166,10 +166,10 @@ def _leave_out(found: Found) -> None:
             beyond = _check(found.corners[keyword][k], have, have, keyword, counts, lines, found.faults)
             bad[np.searchsorted(np.cumsum(counts), beyond, "right")] = True
         if bad.any():
-            kept = np.repeat(~bad, counts)
+            remaining = np.repeat(~bad, counts)
             found.counts[k] = counts[~bad]
             for pieces in found.corners.values():
-                pieces[k] = pieces[k][kept]
+                pieces[k] = pieces[k][remaining]
         broken.append(bad)
     found.lines = []
     before = np.concatenate([[0], *broken]).cumsum()

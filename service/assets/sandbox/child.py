@@ -22,7 +22,7 @@ from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
 
 NICENESS = 5
-LARGE = 1 << 20  # bytes of a file after which memory is given back to the system
+LARGE = 1 << 20  # bytes of a file after which freed memory is returned to the system
 EARLY = ("PIL.Image", "PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.WebPImagePlugin", "OpenImageIO", "DracoPy")
 
 

@@ -9,14 +9,14 @@ from service.assets.types import ScenePart
 
 @dataclass
 class PartFiles:
-    """The parts of a scene; `kept[k]` is "part:k" in the document."""
+    """The parts of a scene; `parts[k]` is "part:k" in the document."""
 
-    kept: list[ScenePart] = field(default_factory=list)
+    parts: list[ScenePart] = field(default_factory=list)
     _numbers: dict[bytes, int] = field(default_factory=dict)
 
-    def keep(self, data: bytes, pointer: str, vertices: int | None = None, triangles: int | None = None) -> str:
-        """The reference of a part; the same bytes get the same one."""
+    def add(self, data: bytes, pointer: str, vertices: int | None = None, triangles: int | None = None) -> str:
+        """Add a part, unless one with the same bytes is there. Returns its reference."""
         if data not in self._numbers:
-            self._numbers[data] = len(self.kept)
-            self.kept.append(ScenePart(data, pointer, vertices, triangles))
+            self._numbers[data] = len(self.parts)
+            self.parts.append(ScenePart(data, pointer, vertices, triangles))
         return f"part:{self._numbers[data]}"

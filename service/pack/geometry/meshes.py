@@ -89,16 +89,16 @@ def place(
 def survey(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[Triangles, np.ndarray]:
     """The triangles that have an area, and the boxes (n, 6) float32 around them, in the order of the meshes."""
     points = [(mesh.vertices - origin).astype(np.float32) for mesh in meshes]
-    kept, boxes, degenerate = list[np.ndarray | None](), [np.zeros((0, 6), np.float32)], dict[int, int]()
+    valid, boxes, degenerate = list[np.ndarray | None](), [np.zeros((0, 6), np.float32)], dict[int, int]()
     for mesh, own in zip(meshes, points, strict=True):
         found, flat = np.empty((len(mesh.faces), 6), np.float32), np.empty(len(mesh.faces), bool)
         in_threads(partial(_survey, own, mesh.faces, found, flat), chunks(len(found)))
         lost = int(np.count_nonzero(flat))
-        kept.append(np.flatnonzero(~flat) if lost else None)
+        valid.append(np.flatnonzero(~flat) if lost else None)
         boxes.append(found[~flat] if lost else found)
         if lost:
             degenerate[mesh.shape] = lost
-    return Triangles(meshes, points, kept, degenerate), boxes[1] if len(meshes) == 1 else np.concatenate(boxes)
+    return Triangles(meshes, points, valid, degenerate), boxes[1] if len(meshes) == 1 else np.concatenate(boxes)
 
 
 def _survey(points: np.ndarray, faces: np.ndarray, boxes: np.ndarray, flat: np.ndarray, which: slice) -> None:
@@ -121,7 +121,7 @@ class Triangles:
 
     meshes: list[PlacedMesh]
     points: list[np.ndarray]  # their vertices (k, 3) float32, relative to the origin
-    kept: list[np.ndarray | None]  # the faces that are not degenerate; None: all
+    valid: list[np.ndarray | None]  # the faces that are not degenerate; None: all
     degenerate: dict[int, int]  # the number of degenerate faces, by shape
 
     def __len__(self) -> int:
@@ -142,7 +142,7 @@ class Triangles:
     def doubled_areas(self) -> np.ndarray:
         """(n,) float64: twice the area of each."""
         out = [np.zeros(0)]
-        for number, which in enumerate(self.kept):
+        for number, which in enumerate(self.valid):
             a, b, c = self._corners(number, slice(None) if which is None else which)
             out.append(np.sqrt(_squares(np.cross(b - a, c - a))))
         return np.concatenate(out)
@@ -194,7 +194,8 @@ class Triangles:
 
     def _counts(self) -> list[int]:
         return [
-            len(mesh.faces) if kept is None else len(kept) for mesh, kept in zip(self.meshes, self.kept, strict=True)
+            len(mesh.faces) if valid is None else len(valid)
+            for mesh, valid in zip(self.meshes, self.valid, strict=True)
         ]
 
     def _corners(self, number: int, which: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -204,9 +205,9 @@ class Triangles:
     def _spread(self, places: np.ndarray | None, some: Callable[[int, Rows, Rows], None]) -> None:
         """Call `some` with a mesh's number, some of its faces and their final places, until all faces are done."""
         jobs, start = list[tuple[int, Rows, Rows]](), 0
-        for number, (kept, count) in enumerate(zip(self.kept, self._counts(), strict=True)):
+        for number, (valid, count) in enumerate(zip(self.valid, self._counts(), strict=True)):
             for part in chunks(count):
-                which = part if kept is None else kept[part]
+                which = part if valid is None else valid[part]
                 where = slice(start + part.start, start + part.stop)
                 jobs.append((number, which, where if places is None else places[where]))
             start += count

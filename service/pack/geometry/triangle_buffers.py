@@ -53,16 +53,16 @@ def write_triangles(
     for name, values in corners.items():
         if len(values):
             triangles.write_corners(name, places, values[:own])
-    kept, node = list[SharedMesh](), 0
+    written, node = list[SharedMesh](), 0
     for each in shared:
         part = slice(own, own + each.count)
         nodes[node : node + len(each.nodes)] = each.nodes
         at = nodes[node : node + len(each.nodes)]
         own, node = part.stop, node + len(at)
-        written = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
-        kept.append(replace(written, nodes=at))
+        mesh = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
+        written.append(replace(mesh, nodes=at))
     return TriangleBuffers(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(
-        kept
+        written
     )
 
 

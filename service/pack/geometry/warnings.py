@@ -38,8 +38,8 @@ def odd_meshes(found: Iterable[OddMesh], materials: np.ndarray, emissive: np.nda
 
     `materials` are the layout.Material records, and `emissive` (materials,) is whether each shines.
     """
-    told = [(each.shape, _odd(each, materials[each.material], bool(emissive[each.material]))) for each in found]
-    return counted((shape, text) for shape, text in told if text)
+    details = [(each.shape, _odd(each, materials[each.material], bool(emissive[each.material]))) for each in found]
+    return counted((shape, text) for shape, text in details if text)
 
 
 def _odd(mesh: OddMesh, material: np.void, emits: bool) -> str:

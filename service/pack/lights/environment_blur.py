@@ -130,8 +130,8 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
         apart = 2 * np.sin((polar[i] - near) / 2) ** 2
         apart = apart[:, None] + math.sin(polar[i]) * np.sin(near)[:, None] * around
         kernel = np.fft.hfft(np.exp(apart / -(blur**2)), points, axis=1)[:, :count]
-        met = np.matmul(both[:, :, first:last], kernel.T[:, :, None].copy())[..., 0]
-        light = np.fft.irfft(met.view(np.complex128), width, axis=0)  # (width, 8)
+        product = np.matmul(both[:, :, first:last], kernel.T[:, :, None].copy())[..., 0]
+        light = np.fft.irfft(product.view(np.complex128), width, axis=0)  # (width, 8)
         out[i] = light[:, :3] / light[:, 3:4]
         out[height - 1 - i] = light[:, 4:7] / light[:, 7:]
     return np.maximum(out, 0)  # light that a transform leaves below 0 is its rounding, 1e-14 of the brightest

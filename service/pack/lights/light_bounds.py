@@ -121,11 +121,11 @@ def grow_light_tree(
     """
     power = (power / (power.max(initial=0.0) or 1.0)).astype(np.float32)
 
-    def make(b: LightBounds) -> _Kept:
+    def make(b: LightBounds) -> _LightTree:
         from gpu.accel.light_tree import build  # here, as it loads numba
 
-        given = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond)
-        return _Kept(share, *build(*given, power / b.solid_angle, share, reach))
+        arrays = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond)
+        return _LightTree(share, *build(*arrays, power / b.solid_angle, share, reach))
 
     if cache is None or len(lights) < LASTING:
         b = bounds(lights, shapes, sides)
@@ -152,7 +152,7 @@ def _content(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: 
     return [digest(array) for array in (kinds, sides, *places, *shining)]
 
 
-class _Kept:
+class _LightTree:
     def __init__(
         self, share: float, words: np.ndarray, trails: np.ndarray, even: float, intensity: np.ndarray
     ) -> None:

@@ -30,7 +30,7 @@ class TexelLimits(Protocol):
 
 @dataclass(frozen=True)
 class PackedTexels:
-    """All images of a scene; `places`: `TextureReference.kept` -> (first texel among those of its kind, image)."""
+    """All images of a scene; `places`: `TextureReference.key` -> (first texel among those of its kind, image)."""
 
     texels: np.ndarray
     floats: np.ndarray

@@ -37,7 +37,7 @@ class TextureReference:
     decoded: bool = False  # floats that are said to be sRGB
 
     @property
-    def kept(self) -> str:
+    def key(self) -> str:
         """The key under which the texels of an image are stored."""
         assert isinstance(self.texture, ImageTexture)
         return self.texture.asset + (DECODED if self.decoded else "")

@@ -37,7 +37,7 @@ def pack_textures(
     images = images_of(scene, assets)
     uses = list(uses_of(scene, images))
     check_channels(uses, images)
-    used = {use.kept: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
+    used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.reference.texture for use in uses if isinstance(use.texture, ImageTexture)}
     texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
     if not uses:
@@ -48,28 +48,28 @@ def pack_textures(
     key = " ".join(f"{kept}@{first}" for kept, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key)
-    return arrays, uses, texels, [*_told(wanted, images), *_warnings(uses, texels)]
+    return arrays, uses, texels, [*_image_warnings(wanted, images), *_warnings(uses, texels)]
 
 
 def _slots(uses: list[TextureReference]) -> dict[str, int]:
     """Member -> slot. Members share a slot where no material reads two textures by them."""
-    taken: dict[str, dict[int, tuple[str, bool]]] = {}
+    looks: dict[str, dict[int, tuple[str, bool]]] = {}
     for use in uses:
-        taken.setdefault(use.member, {})[use.material] = use.look
-    surface = [name for name in (*texture_records.SURFACE_RANGES, *texture_records.NORMALS) if name in taken]
+        looks.setdefault(use.member, {})[use.material] = use.look
+    surface = [name for name in (*texture_records.SURFACE_RANGES, *texture_records.NORMALS) if name in looks]
     slots: dict[str, int] = {}
-    held: list[dict[int, tuple[str, bool]]] = []
+    by_slot: list[dict[int, tuple[str, bool]]] = []
     for name in surface:
-        mine = taken[name]
-        fits = (all(others.get(m, look) == look for m, look in mine.items()) for others in held)
-        slots[name] = next((slot for slot, good in enumerate(fits) if good), len(held))
-        if slots[name] == len(held):
-            held.append({})
-        held[slots[name]] |= mine
+        mine = looks[name]
+        fits = (all(others.get(m, look) == look for m, look in mine.items()) for others in by_slot)
+        slots[name] = next((slot for slot, good in enumerate(fits) if good), len(by_slot))
+        if slots[name] == len(by_slot):
+            by_slot.append({})
+        by_slot[slots[name]] |= mine
     for name in texture_records.OTHER_RANGES:
-        if name in taken:
-            slots[name] = len(held)
-            held.append(taken[name])
+        if name in looks:
+            slots[name] = len(by_slot)
+            by_slot.append(looks[name])
     return slots
 
 
@@ -99,7 +99,7 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
         record["turn"] = (texture.scale[0], 0, 0, texture.scale[1])
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
-    first, image = texels.places[use.kept]
+    first, image = texels.places[use.key]
     flags = {"repeat": 0, "clamp": texture_records.SLOT_CLAMP, "mirror": texture_records.SLOT_MIRROR}[texture.wrap]
     flags |= texture_records.SLOT_SRGB if use.srgb else 0
     flags |= 0 if image.is_8bit else texture_records.SLOT_FLOATS
@@ -158,7 +158,7 @@ def values_of(use: TextureReference, pixels: np.ndarray) -> np.ndarray:
     return np.asarray(pixels[..., :3] * np.array(_factor(use.reference), np.float32))
 
 
-def _told(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterator[str]:
+def _image_warnings(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterator[str]:
     """Warnings about the images of these textures."""
     for asset, name in wanted.items():
         yield from (f"/textures/{escaped(name)}/asset: {warning}" for warning in images[asset].warnings)
@@ -177,10 +177,10 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
         pixels: np.ndarray
         if isinstance(use.texture, CheckerTexture):
             pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
-        elif texels.places[use.kept][1].is_8bit:
+        elif texels.places[use.key][1].is_8bit:
             continue  # 0..1: times the factor it stays in the range by definition
         else:
-            pixels = texels.places[use.kept][1].pixels
+            pixels = texels.places[use.key][1].pixels
         values = values_of(use, pixels)
         if isinstance(use.reference, ScalarTexture):
             values = values[..., :1]
