@@ -23,21 +23,23 @@ from gpu.settings import RenderSettings
 
 class Renderer:
     """A device with its context and compiled kernels. `shaders` are the folders in which shader files are looked for,
-    one after the other. Raises ContextError where no context can be created."""
+    one after the other. Raises ContextError where no context can be created.
+
+    `context` is moderngl's; each method makes it current first."""
 
     def __init__(self, device: int | None = None, shaders: Sequence[Path] = (SHADERS,)) -> None:
         self._thread = threading.get_ident()
-        self._context = contexts.create(device)
-        self._kernels = KernelCache(self._context, shaders)
+        self.context = contexts.create(device)
+        self._kernels = KernelCache(self.context, shaders)
         self._texels = TextureCache()
-        self._bsdf = BsdfEvaluator(self._context, self._kernels)
-        self._uniform_buffer = self._context.buffer(reserve=layout.Uniforms.dtype.itemsize)
-        self.info: dict[str, Any] = contexts.describe(self._context)
+        self._bsdf = BsdfEvaluator(self.context, self._kernels)
+        self._uniform_buffer = self.context.buffer(reserve=layout.Uniforms.dtype.itemsize)
+        self.info: dict[str, Any] = contexts.describe(self.context)
 
     def _own(self) -> None:
         if threading.get_ident() != self._thread:
             raise WrongThread("a Renderer belongs to the thread that made it")
-        contexts.use(self._context)
+        contexts.use(self.context)
 
     def load(
         self,
@@ -53,7 +55,7 @@ class Renderer:
         """
         self._own()
         _check(arrays)
-        return Scene(self._context, arrays, editing, self._texels, everything, raised)
+        return Scene(self.context, arrays, editing, self._texels, everything, raised)
 
     def load_fallback(self, arrays: SceneArrays, raised: frozenset[str] | None = None) -> Scene:
         """Upload a scene for a kernel of `fallback`, which must be able to show it: the superset kernel with the
@@ -63,7 +65,7 @@ class Renderer:
         """
         self._own()
         _check(arrays)
-        return FallbackScene(self._context, arrays, self._texels, raised)
+        return FallbackScene(self.context, arrays, self._texels, raised)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.
@@ -71,7 +73,7 @@ class Renderer:
         Raises CompileError, OutOfMemory.
         """
         self._own()
-        return Picture(self._context, self._kernels, self._uniform_buffer, scene, settings)
+        return Picture(self.context, self._kernels, self._uniform_buffer, scene, settings)
 
     @property
     def bsdf(self) -> BsdfEvaluator:
@@ -101,7 +103,7 @@ class Renderer:
         self._texels.release()
         self._bsdf.release()
         self._uniform_buffer.release()
-        contexts.release(self._context)
+        contexts.release(self.context)
 
     def __enter__(self) -> Renderer:
         return self

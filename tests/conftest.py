@@ -82,7 +82,7 @@ def gpu() -> Iterator[Renderer]:
 def _current_context(request: pytest.FixtureRequest) -> None:
     """Make the session's context current: the last test may have made another, and a probe calls GL by itself."""
     if "gpu" in request.fixturenames:
-        contexts.use(request.getfixturevalue("gpu")._context)
+        contexts.use(request.getfixturevalue("gpu").context)
 
 
 @pytest.fixture(scope="session")

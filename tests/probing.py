@@ -50,7 +50,7 @@ class Prober:
     """Kernels, buffers and uniforms for probes on the context of a Renderer; see `prober_of`."""
 
     def __init__(self, renderer: Renderer) -> None:
-        self.context = renderer._context
+        self.context = renderer.context
         self._kernels = KernelCache(self.context, (PROBES, SHADERS))
 
     @cached_property

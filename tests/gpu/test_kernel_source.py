@@ -62,7 +62,7 @@ def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) ->
         b_glsl="float f() {\n    return undefined_name;\n}\n",
     )
     with pytest.raises(CompileError, match=r"b\.glsl:2"):
-        KernelCache(gpu._context, folders).get("a.comp", {})
+        KernelCache(gpu.context, folders).get("a.comp", {})
 
 
 def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:

@@ -24,7 +24,7 @@ void main() { b[0] = WHICH; }
 @pytest.fixture
 def few(gpu: Renderer, tmp_path: Path) -> Iterator[KernelCache]:
     (tmp_path / "a.comp").write_text(TEXT)
-    made = KernelCache(gpu._context, (tmp_path,), most=3, longest_s=100.0)
+    made = KernelCache(gpu.context, (tmp_path,), most=3, longest_s=100.0)
     yield made
     made.release()
 
@@ -47,7 +47,7 @@ def test_what_is_held_stays(gpu: Renderer, few: KernelCache) -> None:
     for which in range(100, 120):
         get(few, which)
     assert len(few) == 5 + 3 and all(get(few, which) == (held[which], False) for which in range(5))
-    output = gpu._context.buffer(reserve=4)
+    output = gpu.context.buffer(reserve=4)
     output.bind_to_storage_buffer(0)
     held[3].run(1)  # type: ignore[attr-defined]
     assert np.frombuffer(output.read(), np.uint32)[0] == 3

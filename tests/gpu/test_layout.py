@@ -36,14 +36,14 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
     known = defines(frozenset({"HAS_INSTANCES"} if slot is None else ()))
     known |= {f"{name.upper()}_COUNT": count} if block else {}
     head = "\n".join(f"#define {k} {v}" for k, v in known.items())
-    kernel = gpu._context.compute_shader(
+    kernel = gpu.context.compute_shader(
         f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout_glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         f"void main() {{\n    uint i = gl_GlobalInvocationID.x;\n    if (i >= {count}u) return;\n"
         f"    {record.__name__} r = {name}_load(i);\n" + "\n".join(lines) + "\n}\n"
     )
-    data = linear_texture(gpu._context, words, 4, "u4") if slot is None else gpu._context.buffer(words.tobytes())
-    echo = gpu._context.buffer(reserve=4 * count * out_words)
+    data = linear_texture(gpu.context, words, 4, "u4") if slot is None else gpu.context.buffer(words.tobytes())
+    echo = gpu.context.buffer(reserve=4 * count * out_words)
     if slot is None:
         data.use(bindings.INSTANCES_TEXTURE)
     elif block:
@@ -75,12 +75,12 @@ def test_uniform_block_arrives(gpu: Renderer) -> None:
             lines.append(f"    echo[{len(expected)}] = {bits};")
             expected.append(words[offset + k])
     head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset({"HAS_INSTANCES"})).items())
-    kernel = gpu._context.compute_shader(
+    kernel = gpu.context.compute_shader(
         f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout_glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
     )
-    data, echo = gpu._context.buffer(words.tobytes()), gpu._context.buffer(reserve=4 * len(expected))
+    data, echo = gpu.context.buffer(words.tobytes()), gpu.context.buffer(reserve=4 * len(expected))
     data.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
     echo.bind_to_storage_buffer(15)
     kernel.run(1)

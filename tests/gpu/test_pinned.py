@@ -70,7 +70,7 @@ def test_the_picture_is_the_same(gpu: Renderer) -> None:
 
 
 def test_only_large_arrays_that_stay_as_they_are(gpu: Renderer) -> None:
-    context = gpu._context
+    context = gpu.context
     large = np.zeros(LEAST, np.uint8)
     assert pin(context, large) is None
     large.flags.writeable = False

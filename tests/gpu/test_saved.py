@@ -68,8 +68,8 @@ def test_what_it_takes(gpu: Renderer) -> None:
 
 def test_memory_that_is_not_there(gpu: Renderer) -> None:
     with pytest.raises(OutOfMemory, match="MiB"):
-        contexts.allocate(gpu._context, 1 << 50)
-    assert gpu._context.error == "GL_NO_ERROR"
+        contexts.allocate(gpu.context, 1 << 50)
+    assert gpu.context.error == "GL_NO_ERROR"
     arrays = pack(parse_scene(SCENE), Images()).arrays
     scene = gpu.load(arrays)
     with pytest.raises(OutOfMemory, match="MiB"):

@@ -48,54 +48,54 @@ class Pool:
     def __init__(self, seats: Sequence[Seat]) -> None:
         self.statistics = ClientStatistics()
         numbers = itertools.count(1)
-        self._supervisors = [
+        self.supervisors = [
             Supervisor(seat.options, seat.start, seat.place, numbers, _Seated(self, number))
             for number, seat in enumerate(seats)
         ]
-        self._homes: dict[int, Supervisor] = {}  # by task
+        self.homes: dict[int, Supervisor] = {}  # which of them works on it, by open task
         self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
-        self._division = Division([_Peer(supervisor) for supervisor in self._supervisors])
+        self._division = Division([_Peer(supervisor) for supervisor in self.supervisors])
 
     def start(self) -> None:
-        for supervisor in self._supervisors:
+        for supervisor in self.supervisors:
             supervisor.start()
 
     def drain(self) -> None:
-        for supervisor in self._supervisors:
+        for supervisor in self.supervisors:
             supervisor.drain()
         self._changed()
 
     async def close(self) -> None:
         self.drain()
-        await asyncio.gather(*(supervisor.close() for supervisor in self._supervisors))
+        await asyncio.gather(*(supervisor.close() for supervisor in self.supervisors))
 
     @property
     def members(self) -> list[Member]:
-        return [member for supervisor in self._supervisors for member in supervisor.members]
+        return [member for supervisor in self.supervisors for member in supervisor.members]
 
     @property
     def info(self) -> dict[str, Any] | None:
-        return next((info for each in self._supervisors if (info := each.info) is not None), None)
+        return next((info for each in self.supervisors if (info := each.info) is not None), None)
 
     @property
     def process_id(self) -> int | None:
-        return next((id for each in self._supervisors if (id := each.process_id) is not None), None)
+        return next((id for each in self.supervisors if (id := each.process_id) is not None), None)
 
     @property
     def hopeless(self) -> bool:
-        return all(supervisor.hopeless for supervisor in self._supervisors)
+        return all(supervisor.hopeless for supervisor in self.supervisors)
 
     @property
     def waiting(self) -> str:
         """What all renderers wait for, for which there is no place; "" where one of them renders, or starts."""
-        reasons = [each.waiting for each in self._supervisors]
+        reasons = [each.waiting for each in self.supervisors]
         return " ".join(dict.fromkeys(reasons)) if all(reasons) else ""
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:
         try:
             async with asyncio.timeout(timeout_s):
                 while True:
-                    able = any(supervisor.takes_tasks for supervisor in self._supervisors)
+                    able = any(supervisor.takes_tasks for supervisor in self.supervisors)
                     if not able:
                         raise Unavailable(self._detail)
                     if (info := self.info) is not None:
@@ -105,7 +105,7 @@ class Pool:
             raise Unavailable(self.waiting or STARTING) from None
 
     async def able(self, timeout_s: float) -> None:
-        if not any(supervisor.replaces for supervisor in self._supervisors):
+        if not any(supervisor.replaces for supervisor in self.supervisors):
             await self.ready(timeout_s)
 
     def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
@@ -113,8 +113,8 @@ class Pool:
         if home is None:
             raise Unavailable(self._detail)
         task = home.open(listener, kind, client)
-        self._homes[task] = home
-        self._division.opened(task, self._supervisors.index(home), None if kind == "render" else 1)
+        self.homes[task] = home
+        self._division.opened(task, self.supervisors.index(home), None if kind == "render" else 1)
         return task
 
     def divide(self, task: int, most: int | None) -> None:
@@ -124,11 +124,11 @@ class Pool:
         return 0 if task is None else self._division.renderers(task)
 
     def drop(self, task: int) -> None:
-        if (home := self._homes.get(task)) is not None:
+        if (home := self.homes.get(task)) is not None:
             home.drop(task)
 
     def send(self, message: ToRenderer) -> None:
-        if (home := self._homes.get(message.task)) is not None:
+        if (home := self.homes.get(message.task)) is not None:
             self._division.sent(message)
             home.send(message)
 
@@ -136,7 +136,7 @@ class Pool:
         if restore is not None and restore.reason is None:
             await self._move_to_driver(update.task, restore.saved.driver)
         # It may move to another renderer while the scene is encoded.
-        while (home := self._homes.get(update.task)) is not None:
+        while (home := self.homes.get(update.task)) is not None:
             if not await home.sent_scene(update, restore):
                 continue
             if update.scene is None:
@@ -146,13 +146,13 @@ class Pool:
             break
 
     def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
-        if (home := self._homes.get(task)) is not None:
+        if (home := self.homes.get(task)) is not None:
             home.stored(task, picture, read)
 
     @property
     def _detail(self) -> str:
         """Why nothing renders, as each renderer says it, and once where all say the same."""
-        return " ".join(dict.fromkeys(supervisor.detail for supervisor in self._supervisors))
+        return " ".join(dict.fromkeys(supervisor.detail for supervisor in self.supervisors))
 
     def _best(
         self, load: Callable[[Supervisor], tuple[int, ...]], driver: str = "", other_than: Supervisor | None = None
@@ -161,7 +161,7 @@ class Pool:
 
         None where there is none.
         """
-        able = [each for each in self._supervisors if each.takes_tasks and each is not other_than]
+        able = [each for each in self.supervisors if each.takes_tasks and each is not other_than]
         return min(
             able,
             key=lambda each: (bool(driver) and each.driver != driver, each.info is None, load(each)),
@@ -169,7 +169,7 @@ class Pool:
         )
 
     def _changed(self) -> None:
-        for supervisor in self._supervisors:
+        for supervisor in self.supervisors:
             if supervisor.waiting:
                 self._take_over_from(supervisor)
         self._division.assign()
@@ -186,7 +186,7 @@ class Pool:
                 continue
             at_once = home.info is not None and driver in ("", home.driver)  # nothing of it is lost
             if lost.hopeless or (at_once and (lost.waiting or task.kind in QUESTIONS)):
-                self._move(number, home)
+                self.move(number, home)
                 moved += 1
         if moved:
             log.info("moved tasks to other renderers", {"renderer": lost.place.id, "tasks": moved})
@@ -200,40 +200,41 @@ class Pool:
             return
         with suppress(TimeoutError):
             async with asyncio.timeout(DRIVERS_S):
-                while len(self._supervisors) > 1 and not self._is_at_driver(number, driver) and self._starts:
+                while len(self.supervisors) > 1 and not self._is_at_driver(number, driver) and self._starts:
                     await self._stirred.wait()
-        home = self._homes.get(number)
+        home = self.homes.get(number)
         if home is None or home.driver == driver:
             return
         task = home.tasks[number]
         best = self._best(_load(task.kind, task.client), driver)
         if best is not None and best is not home and best.driver == driver:
-            self._move(number, best)
+            self.move(number, best)
 
     def _is_at_driver(self, number: int, driver: str) -> bool:
         """Whether it is with a renderer of that driver, or gone."""
-        home = self._homes.get(number)
+        home = self.homes.get(number)
         return home is None or home.driver == driver
 
     @property
     def _starts(self) -> bool:
         """Whether a renderer is being started that was never ready."""
-        return any(each.driver is None and each.takes_tasks and not each.waiting for each in self._supervisors)
+        return any(each.driver is None and each.takes_tasks and not each.waiting for each in self.supervisors)
 
-    def _move(self, number: int, home: Supervisor) -> None:
+    def move(self, number: int, home: Supervisor) -> None:
+        """Let another renderer go on with an open task, from its last checkpoint."""
         self._division.leave(number)
-        task = self._homes[number].give_up(number)
-        self._homes[number] = home
+        task = self.homes[number].give_up(number)
+        self.homes[number] = home
         home.take_over(number, task)
-        self._division.moved(number, self._supervisors.index(home))
+        self._division.moved(number, self.supervisors.index(home))
 
     def _forget(self, task: int) -> None:
-        self._homes.pop(task, None)
+        self.homes.pop(task, None)
         self._division.dropped(task)
 
     def _kind_of(self, task: int) -> Kind:
         """Whose work a renderer does on a task that it assists."""
-        home = self._homes.get(task)
+        home = self.homes.get(task)
         held = None if home is None else home.tasks.get(task)
         return "server" if held is None else held.kind
 
@@ -248,7 +249,7 @@ class _Seated(Events):
         self._pool._changed()
 
     def lost(self) -> None:
-        self._pool._take_over_from(self._pool._supervisors[self._number])
+        self._pool._take_over_from(self._pool.supervisors[self._number])
 
     def ended(self, task: int) -> None:
         self._pool._forget(task)

@@ -54,7 +54,7 @@ class ClusterPool(Pool):
 
     def settle(self, now: float) -> None:
         """Ask the cluster for as many renderers as there are tasks; for all when work lasts, for one after none."""
-        active = sum(task.active for each in self._supervisors for task in each.tasks.values())
+        active = sum(task.active for each in self.supervisors for task in each.tasks.values())
         if active:
             self._idle_since = now
             self._busy_since = self._busy_since or now
@@ -66,7 +66,7 @@ class ClusterPool(Pool):
         self._busy_since = None
         if now - self._idle_since >= IDLE_S:
             awake = [number for number in range(self._count) if number not in self._cluster.resting]
-            kept = next((number for number in awake if self._supervisors[number].info is not None), awake[0])
+            kept = next((number for number in awake if self.supervisors[number].info is not None), awake[0])
             for number in awake:
                 if number != kept:
                     self._cluster.rest(number)

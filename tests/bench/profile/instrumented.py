@@ -58,7 +58,7 @@ class InstrumentedRenderer(Renderer):
         except BaseException:
             self._folder.cleanup()
             raise
-        self._counts = self._context.buffer(reserve=4 * counters)
+        self._counts = self.context.buffer(reserve=4 * counters)
 
     def count(self, picture: Picture, samples: int) -> np.ndarray:
         """The counters, (counters,) int64, after that many further samples of every pixel. The noise meter, which

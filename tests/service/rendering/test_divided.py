@@ -61,7 +61,7 @@ class _Divided:
 
     @property
     def home(self) -> int:
-        return next(n for n, each in enumerate(self.pool._supervisors) if self.task in each.tasks)
+        return next(n for n, each in enumerate(self.pool.supervisors) if self.task in each.tasks)
 
     def kill(self, renderer: int) -> None:
         pid = self.pool.members[renderer].process_id

@@ -44,7 +44,7 @@ class Fakes:
         return self.processes[number]
 
     def home(self, task: int) -> str:
-        return self.pool._homes[task].place.id
+        return self.pool.homes[task].place.id
 
     def homes(self, *tasks: int) -> str:
         return "".join(self.home(task) for task in tasks)
@@ -158,7 +158,7 @@ def test_tasks_of_a_hopeless_one_go_on_elsewhere(impatient: None) -> None:
         assert pool.members[2].state == "lost" and not pool.hopeless and ears[2].messages.qsize() == 1
         assert {fakes.home(pool.open(Ears(), "render")) for _ in range(4)} == {"0", "1"}
         pool.drop(tasks[2])
-        assert fakes.processes[1].told[-1].task == tasks[2] and tasks[2] not in pool._homes
+        assert fakes.processes[1].told[-1].task == tasks[2] and tasks[2] not in pool.homes
         fakes.drivers[2] = "other"
         await fakes.until("ready", "ready", "ready")
         assert fakes.home(pool.open(Ears(), "render")) == "2" and pool.members[2].driver == "other"
@@ -171,7 +171,7 @@ def test_tasks_of_one_that_waits_for_a_place_go_to_one_that_is_ready() -> None:
         pool = fakes.pool
         await fakes.until("ready", "ready")
         begun, saved = pool.open(Ears(), "render"), pool.open(Ears(), "render")
-        pool._move(saved, pool._supervisors[0])
+        pool.move(saved, pool.supervisors[0])
         await pool.send_scene(Update(saved, 1, arrays_of("plain"), settings(8)))
         fakes.processes[0].say(Checkpoint(saved, 1, Progress(4), SavedPicture(4, (0, 0, 0), [], "a")))
         fakes.processes[1].lose()
@@ -194,7 +194,7 @@ def test_without_any_renderer_tasks_are_lost_until_one_is_back(impatient: None) 
             process.lose()
         while await ears.next(str) != "There is no such device.":
             pass
-        assert pool.hopeless and pool.info is None and not pool._homes
+        assert pool.hopeless and pool.info is None and not pool.homes
         with pytest.raises(Unavailable, match="no such device"):
             pool.open(Ears())
         with pytest.raises(Unavailable, match=r"^There is no such device\.$"):
@@ -217,7 +217,7 @@ def test_a_scene_that_meets_a_move_arrives_once(impatient: None) -> None:
         task = pool.open(Ears())
         sending = asyncio.create_task(pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8))))
         await asyncio.sleep(0)  # it is being encoded now
-        pool._move(task, pool._supervisors[1])
+        pool.move(task, pool.supervisors[1])
         await sending
         assert fakes.processes[0].heard(Update) == [] and fakes.processes[1].heard(Update) == [task]
 
@@ -230,7 +230,7 @@ def test_one_renderer_can_help_with_the_task_of_another() -> None:
     async def test(fakes: Fakes) -> None:
         pool, ears = fakes.pool, Ears()
         await fakes.until("ready", "ready")
-        home, helper = pool._supervisors
+        home, helper = pool.supervisors
         task = pool.open(ears)  # which is not divided without being asked for
         await pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8)))
         pool.send(Update(task, 2, stop=StopRule(4), base=1))

@@ -63,8 +63,8 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
                 size = settings(64)
                 await pool.send_scene(Update(streams[-1], 1, arrays_of("plain"), size, interactive=True))
                 await ears.next(Loaded)
-            assert {pool._homes[stream].place.id for stream in streams} == {"0", "1"}
-            away = next(stream for stream in streams if pool._homes[stream].place.id == "1")
+            assert {pool.homes[stream].place.id for stream in streams} == {"0", "1"}
+            away = next(stream for stream in streams if pool.homes[stream].place.id == "1")
             ears = looking[streams.index(away)]
 
             async def frame(serial: int) -> Frame:
@@ -75,7 +75,7 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
             first, second = [member.process_id for member in pool.members]
             assert first is not None and second is not None
             os.kill(second, signal.SIGKILL)
-            assert (await frame(2)).generation == 1 and pool._homes[away].place.id == "1"
+            assert (await frame(2)).generation == 1 and pool.homes[away].place.id == "1"
             assert [member.process_id == id for member, id in zip(pool.members, (first, second), strict=True)] == [
                 True,
                 False,
@@ -83,7 +83,7 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
 
             hearing = [Ears(), Ears()]
             renders = [await rendering(pool, each, ENDLESS) for each in hearing]
-            mine = next(i for i, render in enumerate(renders) if pool._homes[render].place.id == "1")
+            mine = next(i for i, render in enumerate(renders) if pool.homes[render].place.id == "1")
             pool.drop(renders[1 - mine])
             saved = (await hearing[mine].next(Checkpoint)).progress.samples
             broken = True
@@ -92,8 +92,8 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
             os.kill(moved, signal.SIGKILL)
             pool.send(Update(renders[mine], 2, stop=StopRule(saved + 40), base=1))
             done = await hearing[mine].next(Done)
-            assert done.progress.samples == saved + 40 and pool._homes[renders[mine]].place.id == "0"
-            assert (await frame(3)).generation == 1 and pool._homes[away].place.id == "0"
+            assert done.progress.samples == saved + 40 and pool.homes[renders[mine]].place.id == "0"
+            assert (await frame(3)).generation == 1 and pool.homes[away].place.id == "0"
             assert pool.members[1].state == "lost" and not pool.hopeless
             alone = Ears()
             whole = await rendering(pool, alone, saved + 40)

@@ -185,7 +185,7 @@ def test_a_renderer_that_is_not_needed_is_given_back(run: Run, cluster: Cluster,
         assert pool.process_id is not None
         await until(lambda: all(member.state == "ready" for member in pool.members))
         cluster.rest(1)
-        await until(lambda: restarts(pool, "released") == 1 and pool._supervisors[1].waiting == RESTS)
+        await until(lambda: restarts(pool, "released") == 1 and pool.supervisors[1].waiting == RESTS)
         await until(lambda: len(descendants(pool.process_id or 0, "ray::Renderer")) == 1)
         task, ears = await begun(pool)
         await ears.next(Done)
