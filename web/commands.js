@@ -71,6 +71,7 @@ export function makeCommands({
     remove: () => {
       if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing);
     },
+    land: () => controller.handles.land(),
     copyMaterial() {
       clipboard.write(editor.materialSet);
       say("Material copied");
@@ -127,6 +128,9 @@ export function watchButtons(find, does) {
 
 const TOOLS = {
   orbit: "orbit and select",
+  move: "move the selection; arrows and Page up, Page down",
+  rotate: "rotate the selection; arrows",
+  scale: "scale the selection; arrows",
   fly: "look around",
   focus: "focus by clicking",
   inspect: "zoom to pixels; arrows move the cross",
@@ -149,6 +153,12 @@ export function keyTable(does) {
       group: "Work",
     },
     { keys: ["delete"], does: does.remove, says: "delete the selected thing", group: "Work" },
+    {
+      keys: ["end"],
+      does: does.land,
+      says: "set the selection down on the ground",
+      group: "Tools",
+    },
     { keys: ["o"], ctrl: true, does: does.openFiles, says: "open a model or a scene", group: "Work" },
     { keys: [" "], does: does.togglePause, says: "pause, resume", group: "Work" },
     { keys: ["p"], does: does.download, says: "the picture as a PNG", group: "Work" },

@@ -8,6 +8,7 @@ const KEY_ZOOM = 1.1;
 const FLY_PER_S = 0.6; // distances to the target
 
 const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, -1], arrowdown: [0, 1] };
+const LIFTS = { pageup: 1, pagedown: -1 };
 const FLIGHT = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [0, 1, 0], q: [0, -1, 0] };
 const BUTTONS = "button, summary, a, [role=option], [role=tab], [role=listbox]";
 const WRITING = "input:not([type=range], [type=checkbox]), select, textarea, [contenteditable]";
@@ -77,7 +78,7 @@ export function watchKeys(move, acts) {
       if (event.target.dataset?.dirty || (act.notInText && inText(event))) return;
     } else {
       if (ctrl || isTaken(key, event)) return;
-      if ((key === " " || key === "enter" || ARROWS[key]) && event.target.closest(BUTTONS)) return;
+      if ((key === " " || key === "enter" || MOVING.includes(key)) && event.target.closest(BUTTONS)) return;
     }
     const arrow = !ctrl && ARROWS[key];
     if (act) act.does();
@@ -85,6 +86,7 @@ export function watchKeys(move, acts) {
     else if (arrow) move.orbit(arrow[0] * KEY_ORBIT, arrow[1] * KEY_ORBIT);
     else if (!ctrl && (key === "+" || key === "=")) move.zoom(1 / KEY_ZOOM);
     else if (!ctrl && (key === "-" || key === "_")) move.zoom(KEY_ZOOM);
+    else if (!ctrl && LIFTS[key] && move.isHandling()) move.lift(LIFTS[key] * (event.shiftKey ? 10 : 1));
     else if (!ctrl && FLIGHT[key]) flight.press(key);
     else return;
     event.preventDefault();
@@ -92,7 +94,7 @@ export function watchKeys(move, acts) {
   document.addEventListener("keyup", (event) => {
     const key = event.key.toLowerCase();
     flight.lift(key);
-    if (ARROWS[key] || "+=-_".includes(key)) move.rest();
+    if (ARROWS[key] || LIFTS[key] || "+=-_".includes(key)) move.rest();
   });
   window.addEventListener("blur", () => flight.stop());
 }
@@ -116,6 +118,9 @@ const MOVES = [
       ["Alt", "drag", "turn the environment"],
       ["click", "select a thing and its material"],
       ["←", "→", "↑", "↓", "orbit; with Shift slide"],
+      ["←", "→", "↑", "↓", "with Move, Rotate or Scale: change the selection by a step; with Shift by ten"],
+      ["Page up", "Page down", "with Move: raise and lower the selection; with Rotate: roll it"],
+      ["Ctrl", "drag", "of a handle: turn by 15°, move without snapping to the ground"],
       ["+", "−", "come nearer, go away"],
       ["W", "A", "S", "D", "fly; E rises, Q sinks"],
     ],

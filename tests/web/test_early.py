@@ -45,7 +45,7 @@ def test_nothing_is_lost_before_there_is_a_picture(context: BrowserContext, serv
 
     slow.passing = "none"
     page.keyboard.press("ArrowLeft")  # another view, of which no picture comes
-    page.keyboard.press("3")
+    page.keyboard.press("6")
     click(editor, 0.5, 0.5)
     editor.wait("what to do", lambda: "Nothing can be focused on yet" in editor.text("#messages"))
     page.keyboard.press("1")

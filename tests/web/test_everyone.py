@@ -48,7 +48,7 @@ def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any
     editor.page.keyboard.press("Escape")
     editor.page.evaluate("document.activeElement.blur()")
     editor.page.keyboard.press("c")
-    editor.page.keyboard.press("4")
+    editor.page.keyboard.press("7")
     editor.wait("both", lambda: editor.page.is_visible("#comparison") and editor.page.is_visible("#probe"))
     assert findings(editor) == []
     editor.page.keyboard.press("?")

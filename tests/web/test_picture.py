@@ -30,7 +30,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
 
 def test_frame_focus_and_fly(editor: Editor) -> None:
     first = editor.settled()
-    editor.page.keyboard.press("3")
+    editor.page.keyboard.press("6")
     click(editor, 0.5, 0.55)
     editor.wait("a focus", lambda: camera(editor)["aperture_radius"][0] > 0)
     distance = camera(editor)["focus_distance"][0]
@@ -54,7 +54,7 @@ def test_frame_focus_and_fly(editor: Editor) -> None:
 def test_pixels_under_the_glass(editor: Editor) -> None:
     editor.settled()
     editor.page.keyboard.press("Space")
-    editor.page.keyboard.press("4")
+    editor.page.keyboard.press("7")
     editor.page.mouse.move(*point(editor, 0.503, 0.503))  # not where two pixels meet
     editor.wait("the linear value", lambda: "…" not in editor.text("#probe"))
     lines = dict(zip(*[iter(editor.text("#probe").split("\n"))] * 2, strict=True))

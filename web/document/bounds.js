@@ -1,7 +1,7 @@
 // The ball around a shape, as far as its document or what was uploaded here tells; other files of triangles are
 // measured in the picture.
 
-import { add, length, mix, scale, subtract } from "../lib/vector.js";
+import { add, cross, dot, length, mix, scale, subtract } from "../lib/vector.js";
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
@@ -22,6 +22,23 @@ export function place(point, transform) {
   return add([x, y, z], translate);
 }
 
+// Where a place was before the shape's transform.
+export function unplace(point, transform) {
+  const origin = place([0, 0, 0], transform);
+  const [x, y, z] = [0, 1, 2].map((k) =>
+    subtract(
+      place(
+        origin.map((_, i) => Number(i === k)),
+        transform,
+      ),
+      origin,
+    ),
+  );
+  const way = subtract(point, origin);
+  const volume = dot(x, cross(y, z));
+  return [cross(y, z), cross(z, x), cross(x, y)].map((across) => dot(way, across) / volume);
+}
+
 const corners = (low, high) =>
   Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
 
@@ -30,18 +47,40 @@ const measured = new Map(); // the corners of uploaded meshes, by asset
 // `bounds`: least and greatest coordinates, as the server answers an upload.
 export const measure = (asset, [low, high]) => measured.set(asset, corners(low, high));
 
+// Where a sphere's box touches it, also where its transform makes an ellipsoid of it.
+function touches({ center, radius, transform }) {
+  const origin = place([0, 0, 0], transform);
+  const columns = [0, 1, 2].map((k) =>
+    subtract(
+      place(
+        origin.map((_, i) => Number(i === k)),
+        transform,
+      ),
+      origin,
+    ),
+  );
+  const middle = place(center, transform);
+  return [0, 1, 2].flatMap((k) => {
+    const reach = radius * length(columns.map((column) => column[k]));
+    return [-reach, reach].map((way) => middle.map((x, i) => x + (i === k ? way : 0)));
+  });
+}
+
+const seen = new Map(); // the corners of what was seen of other meshes, by asset
+
+// Takes over which points of a mesh can be seen in the picture: all that is known of one that was not uploaded here.
+export function see({ asset, transform }, cloud) {
+  const { low, high } = boxAround(cloud.map((point) => unplace(point, transform)));
+  seen.set(asset, corners(low, high));
+}
+
 function points(shape) {
-  if (shape.type === "sphere") {
-    return [0, 1, 2].flatMap((k) =>
-      [-1, 1].map((side) => shape.center.map((x, i) => x + (i === k ? side * shape.radius : 0))),
-    );
-  }
   if (shape.type === "box") return corners(shape.min, shape.max);
   if (shape.type === "quad") {
     const { origin, u, v } = shape;
     return [origin, add(origin, u), add(origin, v), add(add(origin, u), v)];
   }
-  return shape.vertices ?? measured.get(shape.asset) ?? null;
+  return shape.vertices ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
 }
 
 // {center, radius} of a cloud of points: around the middle of its box.
@@ -52,6 +91,7 @@ export function around(cloud) {
 }
 
 function cloudOf(shape) {
+  if (shape.type === "sphere") return touches(shape);
   const cloud = points(shape);
   return cloud?.length ? cloud.map((point) => place(point, shape.transform)) : null;
 }
@@ -74,11 +114,14 @@ export const remember = (shapes, whole) => {
   for (const shape of shapes) models.set(shape, whole);
 };
 
-// {low, high}, or null where neither the document nor its file tells.
-export function box(shape) {
+// {low, high} of this shape alone, or null where the document doesn't tell.
+export function ownBox(shape) {
   const cloud = cloudOf(shape);
-  return cloud ? boxAround(cloud) : (models.get(shape) ?? null);
+  return cloud && boxAround(cloud);
 }
+
+// {low, high}, or null where neither the document nor its file tells.
+export const box = (shape) => ownBox(shape) ?? models.get(shape) ?? null;
 
 // Of several balls, the box around them.
 export function together(balls) {

@@ -77,6 +77,11 @@ export class Picker {
     return clouds;
   }
 
+  // The points that can be seen of a shape, or null.
+  async cloud(scene, camera, shape) {
+    return (await this.#clouds(scene, camera)).get(shape) ?? null;
+  }
+
   // The ball around what can be seen of a shape, or null.
   async ball(scene, camera, shape) {
     const cloud = (await this.#clouds(scene, camera)).get(shape);

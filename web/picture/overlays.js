@@ -82,10 +82,11 @@ export function showLegend(root, legend) {
   root.replaceChildren(...parts);
 }
 
-// The guides lie over the picture, not over the stage around it.
+// The guides lie over the picture, not over the stage around it. The height of the picture in CSS pixels comes back.
 export function fitGuides(guides, stage, canvas) {
   const zoom = Math.min(stage.clientWidth / canvas.width, stage.clientHeight / canvas.height);
   const [w, h] = [canvas.width * zoom, canvas.height * zoom];
   const style = { width: w, height: h, left: (stage.clientWidth - w) / 2, top: (stage.clientHeight - h) / 2 };
   for (const [name, value] of Object.entries(style)) guides.style.setProperty(name, `${value}px`);
+  return h;
 }

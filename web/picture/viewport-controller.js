@@ -3,6 +3,7 @@
 import { ball, box, together } from "../document/bounds.js";
 import { axes, frame, ray } from "../document/camera.js";
 import { watchGestures } from "./gestures.js";
+import { HANDLED, Handles } from "./handles.js";
 import { Inspector } from "./inspector.js";
 import { Markers } from "./markers.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
@@ -41,6 +42,12 @@ export class ViewportController {
       stream,
     );
     this.markers = new Markers(find("markers"), acts);
+    this.handles = new Handles(find("handles"), {
+      acts,
+      tool: () => ui.state.tool,
+      cloud: (shape) => this.picker.cloud(acts.state.scene, acts.camera, shape),
+      say: parts.say,
+    });
     this.move = {
       ...acts.moves,
       zoom: (factor, x, y) =>
@@ -51,23 +58,26 @@ export class ViewportController {
       },
       tap: (x, y) => this.tap(x, y),
     };
-    // The arrows move the cross where that is the tool.
+    // The arrows move the cross, or change the selection, where that is the tool.
+    const stepped = (steps, orElse) => (right, down) => {
+      if (this.inspector.active) this.inspector.step(steps * Math.sign(right), steps * Math.sign(down));
+      else if (this.handles.isActive) this.handles.step(steps * Math.sign(right), -steps * Math.sign(down), 0);
+      else orElse(right, down);
+    };
     this.keyMove = {
       ...this.move,
-      orbit: (right, down) =>
-        this.inspector.active
-          ? this.inspector.step(Math.sign(right), Math.sign(down))
-          : acts.moves.orbit(right, down),
-      pan: (right, down) =>
-        this.inspector.active
-          ? this.inspector.step(10 * Math.sign(right), 10 * Math.sign(down))
-          : acts.moves.pan(right, down),
+      orbit: stepped(1, acts.moves.orbit),
+      pan: stepped(10, acts.moves.pan),
+      isHandling: () => this.handles.isActive,
+      lift: (steps) => this.handles.step(0, 0, steps),
     };
     watchGestures(this.root, this.move, () => ui.state.tool);
     watchToolbar(find("tools"));
     find("tools").addEventListener("click", ({ target }) => {
       const tool = target.closest("[data-tool]")?.dataset.tool;
-      if (tool) ui.set({ tool });
+      if (!tool) return;
+      ui.set({ tool });
+      if (HANDLED.includes(tool)) this.root.focus(); // where the arrows are the tool's
     });
   }
 
@@ -109,6 +119,8 @@ export class ViewportController {
     const isOn = /^\/(camera|environment|lights)/.test(thing) && this.ui.state.tool !== "inspect";
     if (isOn) fitGuides(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, this.aspect);
+    const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
+    this.handles.show(HANDLED.includes(this.ui.state.tool), this.aspect, height);
   }
 
   // Histogram and clipping follow the picture at their own pace.

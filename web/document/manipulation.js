@@ -1,0 +1,78 @@
+// A thing of the scene moved, turned or scaled as a whole: a shape or a light, by a linear map about a pivot.
+
+import { place } from "./bounds.js";
+import { moved, parts } from "./transforms.js";
+import { add, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
+
+const WORLD = [
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
+
+// Linear maps of vectors: a turn about a unit axis, a stretch along one, the same in all directions.
+export const turning = (axis, degrees) => (v) => turn(v, axis, (degrees * Math.PI) / 180);
+export const stretching = (axis, factor) => (v) => add(v, scale(axis, (factor - 1) * dot(v, axis)));
+export const growing = (factor) => (v) => scale(v, factor);
+
+// An angle in degrees as one from -180 to 180.
+export const wrapped = (degrees) => Number((degrees - 360 * Math.round(degrees / 360)).toFixed(2)) + 0;
+
+export const isLight = ({ type }) => ["point", "spot", "directional"].includes(type);
+
+// By an offset in metres; what has no place stays as it is.
+export function shifted(thing, offset) {
+  if (!isLight(thing)) return moved(thing, offset);
+  return thing.position ? { ...thing, position: tidy(add(thing.position, offset)) } : thing;
+}
+
+// The transform after a map about a pivot. Maps along the thing's own axes, and turns, leave no skew where none was.
+function composed(transform, map, pivot) {
+  const origin = place([0, 0, 0], transform);
+  const columns = WORLD.map((axis) => map(subtract(place(axis, transform), origin)));
+  const to = add(pivot, map(subtract(origin, pivot)));
+  const matrix = [0, 1, 2].flatMap((row) => [...columns.map((column) => column[row]), to[row]]);
+  return parts([...matrix, 0, 0, 0, 1]) ?? { matrix: [...tidy(matrix), 0, 0, 0, 1] };
+}
+
+const isDiagonal = (map) => WORLD.every((axis, k) => map(axis).every((x, i) => i === k || Math.abs(x) < 1e-12));
+
+// The thing after a map about a pivot. Numbers of its own change where they can say it; else its transform does.
+export function mapped(thing, map, pivot) {
+  const to = (point) => tidy(add(pivot, map(subtract(point, pivot))));
+  if (isLight(thing)) {
+    const { position, direction } = thing;
+    return {
+      ...thing,
+      ...(position ? { position: to(position) } : {}),
+      ...(direction ? { direction: tidy(map(direction)) } : {}),
+    };
+  }
+  if (!thing.transform && thing.type === "quad") {
+    return { ...thing, origin: to(thing.origin), u: tidy(map(thing.u)), v: tidy(map(thing.v)) };
+  }
+  if (!thing.transform && isDiagonal(map)) {
+    const factors = WORLD.map((axis, k) => map(axis)[k]);
+    if (thing.type === "box") return { ...thing, min: to(thing.min), max: to(thing.max) };
+    if (thing.type === "sphere" && factors.every((factor) => factor === factors[0]))
+      return { ...thing, center: to(thing.center), radius: Number((thing.radius * factors[0]).toPrecision(7)) };
+  }
+  return { ...thing, transform: composed(thing.transform, map, pivot) };
+}
+
+// The unit axes along which a thing can be stretched without a skew, each beside the world's axis that it is nearest to.
+export function ownAxes(thing) {
+  const { transform } = thing;
+  const origin = place([0, 0, 0], transform);
+  let axes = WORLD.map((axis) => subtract(place(axis, transform), origin));
+  if (thing.type === "quad" && !transform) {
+    const [u, v] = [thing.u, thing.v];
+    axes = [u, v, [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]];
+  }
+  const left = axes.map((axis) => scale(axis, 1 / length(axis)));
+  return WORLD.map((_, k) => {
+    const at = left.reduce((best, axis, i) => (Math.abs(axis[k]) > Math.abs(left[best][k]) ? i : best), 0);
+    const [axis] = left.splice(at, 1);
+    return axis[k] < 0 ? scale(axis, -1) : axis;
+  });
+}
