@@ -11,7 +11,7 @@ from typing import Any
 from service.assets.types import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
-IMPORTER = 3  # raised when files must be imported anew, because their documents or warnings change
+IMPORTER = 4  # raised when files must be imported anew, because their documents or warnings change
 PART = re.compile(r"part:(\d+)")
 
 

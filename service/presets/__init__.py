@@ -8,10 +8,12 @@ generated      the assets that presets use
 field          a thousand spheres
 disney_charts  spheres that show what each parameter of `disney` does
 knot           a torus knot, as a mesh
+shader_ball    a shader ball, as a mesh
+cyclorama      a floor that becomes a wall, as a mesh
 skies          painted skies
-studio         a photographer's studio
+studio         photographers' studios
 latlong        directions and shapes of light in latitude-longitude pictures
-exr            a writer of the plainest OpenEXR files
+exr, ply       writers of the plainest OpenEXR and PLY files
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
 
 KINDS = ("scenes", "materials", "environments")
-DEFAULT_SCENE = "sphere-on-floor"
+DEFAULT_SCENE = "shader-ball"
 
 # Documents that would be long files of numbers.
 COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
@@ -59,8 +61,7 @@ def get(kind: str, name: str) -> dict[str, Any]:
 
 def default_environment() -> dict[str, Any]:
     """What lights a scene that brings no light of its own."""
-    found: dict[str, Any] = get("scenes", DEFAULT_SCENE)["environment"]
-    return found
+    return get("environments", "studio")
 
 
 @cache

@@ -6,14 +6,18 @@ import hashlib
 from collections.abc import Callable
 from functools import cache
 
-from service.presets import knot, skies, studio
+from service.presets import cyclorama, knot, shader_ball, skies, studio
 
 ASSETS: dict[str, Callable[[], bytes]] = {
     "studio": studio.studio,
+    "softbox": studio.softbox,
     "clear-sky": skies.clear_sky,
     "sunset": skies.sunset,
     "overcast": skies.overcast,
     "torus-knot": knot.torus_knot,
+    "shader-ball": shader_ball.shader_ball,
+    "shader-ball-stand": shader_ball.stand,
+    "cyclorama": cyclorama.cyclorama,
 }
 
 

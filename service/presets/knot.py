@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from service.presets import ply
+
 TURNS, TWISTS = 2, 3  # the trefoil
 ALONG, AROUND = 512, 24  # 24 576 triangles: no facet shows at 1080p
 RING, TUBE = 0.62, 0.21  # metres: of the torus, of the tube; the whole is about 2 m across and lies on y = 0
@@ -16,7 +18,8 @@ def torus_knot() -> bytes:
     """A binary PLY with vertex normals, counter-clockwise from outside."""
     vertices, normals = _tube()
     vertices[:, 1] -= vertices[:, 1].min()
-    return _ply(vertices, normals, _faces())
+    names = ("x", "y", "z", "nx", "ny", "nz")
+    return ply.encode(dict(zip(names, np.hstack([vertices, normals]).T, strict=True)), _faces())
 
 
 def _tube() -> tuple[np.ndarray, np.ndarray]:
@@ -48,15 +51,3 @@ def _faces() -> np.ndarray:
     a, b = i * AROUND + j, (i + 1) % ALONG * AROUND + j
     c, d = (i + 1) % ALONG * AROUND + (j + 1) % AROUND, i * AROUND + (j + 1) % AROUND
     return np.stack([a, c, b, a, d, c], axis=-1).reshape(-1, 3)
-
-
-def _ply(vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> bytes:
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\n"
-        + "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
-        + f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    records = np.zeros(len(faces), np.dtype([("count", "u1"), ("indices", "<i4", 3)]))
-    records["count"], records["indices"] = 3, faces
-    return header.encode() + np.hstack([vertices, normals]).astype("<f4").tobytes() + records.tobytes()

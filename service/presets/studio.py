@@ -1,4 +1,4 @@
-"""A photographer's studio: three softboxes in a dark grey room, for a subject seen from +Z."""
+"""Photographers' studios, for a subject seen from +Z: three softboxes in a dark grey room, or a single large one."""
 
 from __future__ import annotations
 
@@ -19,6 +19,16 @@ def studio() -> bytes:
     _hang(picture, d, toward(-128, 40), (0.55, 0.42), (5.6, 5.2, 4.7))
     _hang(picture, d, toward(62, 24), (0.13, 0.50), (5.2, 5.7, 6.3))
     _hang(picture, d, toward(180, 84), (0.70, 0.34), (1.5, 1.5, 1.55))
+    return exr.encode(picture)
+
+
+def softbox() -> bytes:
+    """One large soft light from the left, and a rim behind on the right, above what a cyclorama hides."""
+    d = directions()
+    room = 0.08 + 0.2 * smoothstep(-0.6, 1.0, d[:, :, 1])
+    picture = room[:, :, None] * np.array([0.97, 0.98, 1.0])
+    _hang(picture, d, toward(-118, 40), (0.6, 0.57), (5.8, 5.6, 5.3))
+    _hang(picture, d, toward(46, 50), (0.2, 0.5), (15.0, 15.8, 17.0))
     return exr.encode(picture)
 
 

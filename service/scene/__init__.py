@@ -3,6 +3,7 @@
 document        the document, and how it is parsed
 camera, light, shape, environment, material, texture, transform   its parts
 settings        the settings of a render
+named           what a person can give a name
 base            the base of all models: strict, with hints for editors
 numbers         numbers with their ranges and units
 number_arrays   lists of numbers, checked in one go

@@ -6,14 +6,19 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from service.scene.base import Model, hint, refusal
+from service.scene.base import hint, refusal
 from service.scene.color import Radiometric
+from service.scene.named import Name, Named
 from service.scene.numbers import Direction, Point
 
 HalfAngle = Annotated[float, Field(ge=0, le=90)]
 
 
-class PointLight(Model):
+class _Light(Named):
+    name: Name = None
+
+
+class PointLight(_Light):
     """Shines equally in all directions, with 1/d^2; its shadows are sharp."""
 
     type: Literal["point"]
@@ -30,7 +35,7 @@ class PointLight(Model):
     ]
 
 
-class SpotLight(Model):
+class SpotLight(_Light):
     """A point that shines into a cone: full inside the inner angle, fading to nothing at the outer."""
 
     type: Literal["spot"]
@@ -64,7 +69,7 @@ class SpotLight(Model):
         return self
 
 
-class DirectionalLight(Model):
+class DirectionalLight(_Light):
     """Light from infinity, such as the sun's: parallel, or from a disk in the sky where it has a diameter."""
 
     type: Literal["directional"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.named import Name, Named
 from service.scene.number_arrays import Colors, Coordinates, Directions, Points, Triangles, first_beyond
 from service.scene.numbers import Point, PositiveLength
 from service.scene.transform import AnyTransform
@@ -17,7 +18,8 @@ from service.scene.transform import AnyTransform
 LEAST_SINE = float(np.finfo(np.float32).eps)
 
 
-class _Placed(Model):
+class _Placed(Named):
+    name: Name = None
     material: Annotated[str, hint("Material", "The name of one of the scene's materials.")]
     transform: Annotated[
         AnyTransform | None, OMITTABLE, hint("Transform", "Where the shape stands; without it, as written.")
@@ -150,24 +152,12 @@ class MeshShape(_Placed):
         rows = vertices.shape[1:] == faces.shape[1:] == (3,)
         return rows and (not faces.size or 0 <= faces.min() <= faces.max() < len(vertices))
 
-    def __eq__(self, other: Any) -> bool:
-        """Arrays by value: pydantic's own comparison has no answer for them."""
-        if not isinstance(other, MeshShape):
-            return NotImplemented
-        return all(_equal(getattr(self, name), getattr(other, name)) for name in MeshShape.model_fields)
-
 
 def _check_numbers(vertices: np.ndarray, faces: np.ndarray) -> None:
     beyond = first_beyond(faces, len(vertices))
     if beyond is not None:
         row, last = faces[beyond].tolist(), len(vertices) - 1
         raise refusal(f"{row} names a vertex that is not there: the last is {last}", at=f"/faces/{beyond}")
-
-
-def _equal(a: Any, b: Any) -> bool:
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return np.array_equal(a, b)
-    return type(a) is type(b) and bool(a == b)
 
 
 Shape = Annotated[SphereShape | QuadShape | BoxShape | MeshShape, Field(discriminator="type")]

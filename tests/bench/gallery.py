@@ -101,7 +101,7 @@ PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], fl
     "roughness": (roughness, (1200, 280, 512), -0.5),
     "materials": (materials, (800, 440, 300), 0.0),
     "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
-    "sphere": (preset("sphere-on-floor"), (512, 512, 512), 0.0),
+    "shader-ball": (preset("shader-ball"), (800, 600, 512), 0.0),
 }
 
 

@@ -27,7 +27,8 @@ from tests.counting import python_lines
 
 EVERY = [(kind, entry["name"]) for kind in presets.KINDS for entry in presets.names(kind)]
 SCENES = [name for kind, name in EVERY if kind == "scenes"]
-IMAGES = [name for name in ASSETS if name != "torus-knot"]
+MESHES = ("torus-knot", "shader-ball", "shader-ball-stand", "cyclorama")
+IMAGES = [name for name in ASSETS if name not in MESHES]
 CAMERA = {"position": [0, 1, 8], "target": [0, 0.5, 0]}
 
 
@@ -35,7 +36,7 @@ def among(kind: str, document: dict[str, Any]) -> dict[str, Any]:
     """A scene document with the preset in its place."""
     if kind == "scenes":
         return document
-    scene = presets.get("scenes", presets.DEFAULT_SCENE)
+    scene = presets.get("scenes", "sphere-on-floor")  # the first scene has a wall before a low sun
     if kind == "materials":
         scene["materials"]["subject"] = document
     else:
@@ -63,7 +64,8 @@ def test_lists_have_titles(kind: str) -> None:
 
 
 def test_there_is_enough_to_choose_from() -> None:
-    wanted = {"sphere-on-floor", "cornell-empty", "cornell-boxes", "cornell-spheres", "roughness-row", "sphere-field",
+    wanted = {"shader-ball", "sphere-on-floor", "cornell-empty", "cornell-boxes", "cornell-spheres", "roughness-row",
+              "sphere-field",
               "generated-mesh", "point-lights", "cornell-glossy", "cornell-open", "disney-parameters",
               "disney-grid"}  # fmt: skip
     assert wanted <= set(SCENES)
@@ -249,3 +251,24 @@ def test_every_material_renders(gpu: Renderer, store: AssetStore) -> None:
 def test_every_environment_renders(gpu: Renderer, store: AssetStore, name: str) -> None:
     color = rendered(gpu, store, among("environments", presets.get("environments", name)))[..., :3]
     assert np.isfinite(color).all() and 0.05 < np.median(color) < 1.5
+
+
+@pytest.mark.parametrize("name", ["shader-ball", "shader-ball-stand"])
+def test_the_shader_ball_is_of_closed_bodies_and_has_few_triangles(name: str) -> None:
+    mesh = trimesh.load(io.BytesIO(asset(name)), file_type="ply", process=False)
+    assert isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) < 10_000
+    facing = (mesh.vertex_normals[mesh.faces].mean(axis=1) * mesh.face_normals).sum(axis=1)
+    assert facing.min() > 0.5, "vertex normals lie on their triangles' outer sides"
+    corners = mesh.vertices.round(5)
+    mesh.merge_vertices(merge_norm=True, merge_tex=True, digits_vertex=5)
+    assert mesh.is_watertight and mesh.volume > 0, "glass has an inside"
+    assert corners[:, 1].min() >= 0
+
+
+def test_the_cyclorama_is_brightest_where_the_subject_stands() -> None:
+    mesh = trimesh.load(io.BytesIO(asset("cyclorama")), file_type="ply", process=False)
+    assert isinstance(mesh, trimesh.Trimesh)
+    light = mesh.visual.vertex_colors[:, 0].astype(float)
+    far = np.linalg.norm(mesh.vertices, axis=1)
+    assert far[light.argmax()] < 1 and light[far > 8].max() < 0.25 * light.max()
+    assert np.abs(mesh.face_normals[:, 0]).max() < 1e-6 and (mesh.face_normals[:, 1:] > -1e-6).all()

@@ -105,7 +105,7 @@ def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, s
     """A phone both ways, a tablet's size, and a laptop at 200 %."""
     width, height, touch = size
     page = browser.new_page(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
-    page.goto(server.url + "/")
+    page.goto(server.url + "/#scene=sphere-on-floor")
     page.wait_for_selector("#material-form [data-field]")
     page.click("#compare")
     editor = Editor(page)

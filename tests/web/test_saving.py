@@ -197,7 +197,7 @@ def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server
 
     work(editor, "diffuse")
     second = Editor(context.new_page())
-    second.open(server.url)
+    second.open(server.url, "")
     assert second.page.input_value("#model") == "diffuse", "a new tab begins with the last work"
     work(second, "disney")
     editor.page.reload()
@@ -210,7 +210,7 @@ def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server
     third = Editor(context.new_page())
     name = editor.page.evaluate("sessionStorage['sunbox.tab']")
     third.page.add_init_script(f"sessionStorage['sunbox.tab'] ??= '{name}'")
-    third.open(server.url)
+    third.open(server.url, "")
     assert third.page.evaluate("sessionStorage['sunbox.tab']") != name
     assert third.page.input_value("#model") == "diffuse"
 

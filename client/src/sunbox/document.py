@@ -94,6 +94,8 @@ class BoxShape(TypedDict, total=False):
     """The least x, y and z. (m)"""
     max: Required[list[float]]
     """The greatest x, y and z: each above the lower's. (m)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
@@ -208,6 +210,8 @@ class DirectionalLight(TypedDict, total=False):
     """On a surface that faces the light; the sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
     angular_diameter: float
     """0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays. (degrees, 0 to 90, default 0.0)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
 
 class DisneyMaterial(TypedDict, total=False):
@@ -306,6 +310,8 @@ class MeshShape(TypedDict, total=False):
     """On: vertex normals; off: facets; neither: as the file says, which for STL is facets."""
     double_sided: bool
     """Off: from behind it is not there, for any ray. (default True)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
@@ -409,6 +415,8 @@ class PointLight(TypedDict, total=False):
     """Where the light stands. (m)"""
     intensity: Required[list[float] | float | str]
     """The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi). (W/sr, 0 to 1e+20)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
 
 class PrincipledMaterial(TypedDict, total=False):
@@ -481,6 +489,8 @@ class QuadShape(TypedDict, total=False):
     """From the corner along the first edge. (m)"""
     v: Required[list[float]]
     """Along the second edge; the front faces cross(u, v). (m)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
@@ -519,6 +529,8 @@ class SphereShape(TypedDict, total=False):
     """The middle of the sphere. (m)"""
     radius: Required[float]
     """From the centre to the surface. (m, 0 to 1e+09)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
@@ -541,6 +553,8 @@ class SpotLight(TypedDict, total=False):
     """From the beam's axis to where the light begins to fade. (degrees, 0 to 90)"""
     outer_angle: Required[float]
     """From the beam's axis to where nothing is left; equal to the inner: a sharp edge. (degrees, 0 to 90)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
 
 Environment = ConstantEnvironment | ImageEnvironment | CubemapEnvironment | SkyEnvironment

@@ -20,6 +20,7 @@ from service.assets.gltf.primitives import Primitive, read_primitive
 from service.assets.gltf.textures import Textures
 from service.assets.readers.raw_mesh import MAX_COORDINATE
 from service.assets.scenes.framing import framed
+from service.assets.scenes.names import LONGEST
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.ply_writer import ply
 from service.assets.scenes.room import stand_inside
@@ -96,10 +97,13 @@ class _Importer:
         if "skin" in node.place:
             skin = Skin(self.file, self.file.follow(node.place, "skin", "skins"), self.nodes)
         worlds = np.eye(4)[None] if skin else instances(self.file, node)
-        for place in mesh.objects("primitives"):
+        primitives = list(mesh.objects("primitives"))
+        path = _named(node, mesh)
+        for place in primitives:
             part = self._part(place, morph, skin, node)
             if part is not None:
-                self.placements.add(part, node, worlds)
+                name = f"{path}/{part.shape['material']}" if path and len(primitives) > 1 else path
+                self.placements.add(part, node, worlds, name)
 
     def _part(self, place: JsonView, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
         """The part of one primitive in one pose; a skinned one belongs to its node alone."""
@@ -169,6 +173,14 @@ class _Importer:
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only scene {whole(root.value.get('scene', 0), '/scene')} is shown")
         note_unsupported(root, self.notes)
+
+
+def _named(node: Node, mesh: JsonView) -> str:
+    """The name of a node's mesh: the node's path; below that, by its own name, where the node has children, too."""
+    own = "-".join(mesh.text("name", "").split("/"))[:LONGEST]
+    if not node.path:
+        return own
+    return f"{node.path}/{own or 'Mesh'}" if node.place.array("children") else node.path
 
 
 def _wrong(primitive: Primitive, place: JsonView, name: str, rows: Array, row: int, what: str) -> ParseError:

@@ -29,7 +29,8 @@ def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[
         index = used.whole("light")
         if extension is None or index >= len(listed):
             raise used.error("light", f"refers to light {index} of {len(listed)}")
-        found.append(_light(JsonView(listed[index], f"{extension.at('lights')}/{index}"), node, notes))
+        light = _light(JsonView(listed[index], f"{extension.at('lights')}/{index}"), node, notes)
+        found.append({"name": node.path, **light} if node.path else light)
     return found
 
 

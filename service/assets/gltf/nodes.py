@@ -16,6 +16,7 @@ from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles
 
 MOST_INSTANCES = 100_000  # shapes in a document; with more the document itself would be too large
+LONGEST_NAME = 400  # characters of a path; what is deeper goes by the name of what is above it
 IDENTITY = tuple(np.eye(4).reshape(-1).tolist())
 
 
@@ -24,6 +25,7 @@ class Node:
     place: JsonView
     index: int
     world: Doubles  # (4, 4)
+    path: str  # the names of those above it and its own, with slashes between; empty where none has one
 
 
 class Nodes:
@@ -44,7 +46,7 @@ class Nodes:
                 )
         for k, (local, parent) in enumerate(zip(locals_, parents, strict=True)):
             worlds[k] = local if parent < 0 else worlds[parent] @ local
-        return list(map(Node, places, indices, worlds))
+        return list(map(Node, places, indices, worlds, _paths(places, parents)))
 
     def _walk(self) -> tuple[list[JsonView], list[int], list[int]]:
         """The nodes that are shown, their numbers in the file, and where in the list their parents are (-1: none)."""
@@ -105,6 +107,22 @@ class Nodes:
             return [(k, f"/nodes/{k}") for k in range(len(self._all)) if k not in self.parents]
         scene = file.item("scenes", file.root.value.get("scene", 0), "/scene")
         return [(one, f"{scene.at('nodes')}/{k}") for k, one in enumerate(scene.array("nodes"))]
+
+
+def _paths(places: list[JsonView], parents: list[int]) -> list[str]:
+    """Siblings of the same name are numbered; a node without a name is not a step of the path."""
+    paths: list[str] = []
+    taken: dict[str, int] = {"": 0}
+    for place, parent in zip(places, parents, strict=True):
+        above = paths[parent] if parent >= 0 else ""
+        name = "-".join(place.text("name", "").split("/"))
+        path = (f"{above}/{name}" if above else name) if name else above
+        if name and len(path) <= LONGEST_NAME:
+            count = taken[path] = taken.get(path, 0) + 1
+            if count > 1:
+                path = f"{path} {count}"
+        paths.append(path if len(path) <= LONGEST_NAME else above)
+    return paths
 
 
 def local_matrices(places: list[JsonView]) -> Doubles:

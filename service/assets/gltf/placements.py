@@ -46,8 +46,9 @@ class Placements:
         self._parts: list[Part] = []
         self._nodes: list[Node] = []
         self._matrices: list[Doubles] = []
+        self._names: list[str] = []
 
-    def add(self, part: Part, node: Node, worlds: Doubles) -> None:
+    def add(self, part: Part, node: Node, worlds: Doubles, name: str) -> None:
         """Add `part` under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError where there are too
         many."""
         if len(self._parts) + len(worlds) > MOST_SHAPES:
@@ -55,21 +56,23 @@ class Placements:
         self._parts += [part] * len(worlds)
         self._nodes += [node] * len(worlds)
         self._matrices.extend(worlds)
+        self._names += [name] * len(worlds)
 
     def shapes(self, notes: Warnings) -> list[dict[str, Any]]:
         """A shape for each placement; one whose matrix has no inverse is left out, with a warning."""
         stands, moves = self._stands.tolist(), (self._worlds != np.eye(4)).any(axis=(1, 2)).tolist()
         matrices = self._worlds.reshape(-1, 16).tolist()
         found = []
-        for k, part in enumerate(self._parts):
+        for k, (part, name) in enumerate(zip(self._parts, self._names, strict=True)):
+            named = {"name": name} if name else {}
             if not stands[k]:
                 notes.leave_out(
                     self._nodes[k].place.pointer, "the node's transform makes its mesh flat; it is left out"
                 )
             elif moves[k]:
-                found.append({**part.shape, "transform": {"matrix": matrices[k]}})
+                found.append({**named, **part.shape, "transform": {"matrix": matrices[k]}})
             else:
-                found.append(dict(part.shape))
+                found.append({**named, **part.shape})
         return found
 
     @property

@@ -54,6 +54,8 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
         _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
         for worn, which in _by_material(read)
     ]
+    group = name[: -len(".obj")]
+    shapes = [{"name": f"{group}/{shape['material']}" if len(shapes) > 1 else group} | shape for shape in shapes]
     used = mesh.vertices[np.unique(mesh.faces)]
     bounds = used.min(axis=0), used.max(axis=0)
     document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}

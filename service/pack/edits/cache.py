@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from service.pack.edits.moved_meshes import MovedMeshes
+from service.pack.edits.moved_meshes import MESH_FIELDS, MovedMeshes
 from service.scene.shape import MeshShape, Shape
 
 T = TypeVar("T")
@@ -107,10 +107,10 @@ def _freeze(value: object) -> int:
 
 
 def content(shape: Shape) -> Hashable:
-    """A key that is equal for equal shapes, arrays by their bytes."""
+    """A key that is equal for shapes that look the same, arrays by their bytes."""
     if not isinstance(shape, MeshShape):
         return shape
-    return tuple(digest(getattr(shape, name)) for name in MeshShape.model_fields)
+    return tuple(digest(getattr(shape, name)) for name in MESH_FIELDS)
 
 
 def digest(value: Any) -> Hashable:

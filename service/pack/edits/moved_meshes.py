@@ -7,9 +7,10 @@ from collections.abc import Callable, Hashable, Sequence
 from gpu.arrays import HEAVY
 from service.scene.shape import MeshShape, Shape
 
-FIELDS = tuple(MeshShape.model_fields)
-TRANSFORM = FIELDS.index("transform")
-STILL = [FIELDS.index(name) for name in FIELDS if name not in ("transform", "material", "visible_to_camera")]
+# The fields of a mesh that its looks depend on.
+MESH_FIELDS = tuple(name for name in MeshShape.model_fields if name != "name")
+TRANSFORM = MESH_FIELDS.index("transform")
+STILL = [i for i, name in enumerate(MESH_FIELDS) if name not in ("transform", "material", "visible_to_camera")]
 
 
 class MovedMeshes:

@@ -58,3 +58,19 @@ def test_more_shapes_than_a_document_holds() -> None:
         file.node(mesh=0)
     with pytest.raises(ParseError, match="more than the 100000 primitives allowed"):
         read_scene(file.glb(), LIMITS)
+
+
+def test_shapes_have_the_names_of_their_nodes() -> None:
+    """Paths: parts of a mesh by their materials, siblings of one name by numbers, what has none by its mesh."""
+    file = Gltf()
+    red, blue = (file.add("materials", {"name": name}) for name in ("red", "blue"))
+    body = file.mesh(file.primitive(material=red), file.primitive(material=blue), name="body mesh")
+    wheel = file.mesh(file.primitive(material=red), name="wheel mesh")
+    left = file.node(False, name="Wheel", mesh=wheel)
+    right = file.node(False, name="Wheel", mesh=wheel)
+    file.node(name="Truck", mesh=body, children=[left, right])
+    file.node(name="A/B", mesh=wheel)
+    file.node(mesh=wheel)
+    names = [shape["name"] for shape in read_scene(file.glb(), LIMITS).document["shapes"]]
+    expected = ["Truck/body mesh/red", "Truck/body mesh/blue", "Truck/Wheel", "Truck/Wheel 2", "A-B", "wheel mesh"]
+    assert sorted(names) == sorted(expected)

@@ -33,6 +33,8 @@ def scene(patch: Any) -> Scene:
         ({"environment": {"rotation": 10}}, SceneDiff(environment=True)),
         ({"environment": {"scale": 2}}, SceneDiff(environment=True)),
         ({"camera": {"vfov": 41}, "environment": {"scale": 2}}, SceneDiff(camera=True, environment=True)),
+        ({"lights": [{**SCENE["lights"][0], "name": "Key"}]}, SceneDiff()),  # names are for people
+        ({"shapes": [{**each, "name": "Room/Thing"} for each in BASE["shapes"]]}, SceneDiff()),
         # what decides lights, flags or geometry
         ({"environment": {"scale": 0}}, SceneDiff(whole=True)),
         ({"environment": {"scale": 1e9}}, SceneDiff(whole=True)),
