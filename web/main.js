@@ -225,7 +225,13 @@ const shelf = new Shelf(find, {
   acts: editor,
   thumbnails,
   saved,
-  shapeAt: (x, y) => controller.shapeAt(x, y),
+  carry: {
+    stage: root,
+    outline: find("outline-list"),
+    shapeAt: (x, y) => controller.shapeAt(x, y),
+    prepare: () => controller.picker.layer("shape_id", editor.steady.scene).catch(() => {}),
+    say,
+  },
   rename: (material) => panel.materialPanel.rename(material),
   remove: (material) => panel.materialPanel.remove(material),
 });
@@ -339,7 +345,7 @@ function refresh() {
   controller.mark();
   lobe.refresh();
   clearTimeout(saving);
-  if (editor.canUndo || left) saving = setTimeout(() => keepWork(essence(editor.state)), SAVE_REST_MS);
+  if (editor.canUndo || left) saving = setTimeout(() => keepWork(essence(editor.steady)), SAVE_REST_MS);
 }
 
 function showUi() {

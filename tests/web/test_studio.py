@@ -71,30 +71,6 @@ def test_the_library_is_sifted_and_assigned_by_keys(editor: Editor) -> None:
     assert library.get_by_role("option", selected=True).get_attribute("aria-label") == "Gold"
 
 
-def test_a_material_is_dragged_onto_a_thing(editor: Editor) -> None:
-    editor.settled()
-    stage = editor.page.locator("#stage").bounding_box()
-    assert stage
-    low = {"x": stage["width"] * 0.1, "y": stage["height"] * 0.75}
-
-    def carry(option: str) -> None:
-        """Once more where the picture was not yet ready to tell what lies there."""
-        editor.page.drag_and_drop(option, "#stage", target_position=low)
-        editor.page.wait_for_timeout(500)
-
-    def is_brass() -> bool:
-        carry("#library [data-value=brass]")
-        return bool(document(editor)["materials"]["floor"].get("metallic") == 1)
-
-    def is_shared() -> bool:
-        carry("#materials [data-value=subject]")
-        return bool(document(editor)["shapes"][1]["material"] == "subject")
-
-    editor.wait("brass on the floor", is_brass)
-    assert document(editor)["materials"]["subject"].get("metallic", 0) == 0
-    editor.wait("the other", is_shared)
-
-
 def test_the_first_slider_is_near_the_shelf(editor: Editor) -> None:
     page = editor.page
     page.get_by_role("listbox", name="Materials", exact=True).get_by_role("option", selected=True).focus()

@@ -61,3 +61,28 @@ def test_a_finger_that_scrolls_the_panel_moves_no_slider(phone: tuple[Editor, Sw
     assert float(page.input_value(slider)) == moved, "a slide is one step of undo"
     page.tap("#undo")
     assert page.input_value(slider) == before
+
+
+def test_a_finger_pulls_a_material_onto_a_thing(phone: tuple[Editor, Swipe]) -> None:
+    editor, swipe = phone
+    page = editor.page
+    ball = "#materials [data-value=subject]"
+    editor.settled()
+    second = page.locator("#library [role=option]:nth-child(2)")
+    before = second.bounding_box()
+    swipe("#library [role=option]:nth-child(2)", -100, 2)
+    after = second.bounding_box()
+    assert before and after and after["x"] < before["x"] - 50, "sideways the row scrolls"
+    assert page.is_disabled("#undo")
+    page.locator(ball).scroll_into_view_if_needed()
+    stage, tile = page.locator("#stage").bounding_box(), page.locator(ball).bounding_box()
+    assert stage and tile
+    floor = stage["y"] + 0.75 * stage["height"] - tile["y"] - tile["height"] / 2
+
+    def is_taken() -> bool:
+        swipe(ball, stage["x"] + 8 - tile["x"] - 0.8 * tile["width"], floor)
+        page.wait_for_timeout(500)
+        return editor.text("#material-users") == "Sphere and Quad are made of it."
+
+    editor.wait("the floor to take it", is_taken)
+    assert page.locator(".pulled").count() == 0

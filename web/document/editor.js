@@ -4,6 +4,7 @@
 import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
+import { dressed } from "./dressing.js";
 import { exposed } from "./lighting.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { at, pointer, put } from "../lib/patch.js";
@@ -198,6 +199,20 @@ export class Editor extends Store {
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
+  // A thing gets a material, as `dressed` has it.
+  dress(thing, what) {
+    this.try(null);
+    const { scene, material, arrival, lost } = dressed(this.state, thing, what);
+    this.#arrival = arrival;
+    this.change({ scene, chosen: { ...this.state.chosen, thing, material } });
+    if (lost.length) this.complain(new Error(missingWords(lost)));
+  }
+
+  // Shows a thing so, for as long as a hand hovers over it; null for no thing.
+  tryOn(thing, what) {
+    this.try(thing && { scene: dressed(this.steady, thing, what).scene });
+  }
+
   pickModel(type) {
     return this.#turn(this.materialPlace, type);
   }
@@ -307,6 +322,10 @@ export class Editor extends Store {
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
   // says which place the control is for (null: none has it). These places come back. A whole material goes as it came.
   takeBack({ errors }, valid, mark) {
+    if (this.steady !== this.state) {
+      this.try(null);
+      return [null];
+    }
     const arrival = this.#arrival;
     const isArrivals = ({ pointer: wrong }) =>
       [arrival.place, ...arrival.added.map((name) => pointer("scene", "textures", name))].some(

@@ -2,6 +2,7 @@
 // Enter or Space chooses one.
 
 import { element } from "./dom.js";
+import { watchPull } from "./pull.js";
 
 const STEPS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
@@ -11,9 +12,15 @@ export class PictureList {
   #chosen = null;
 
   // `root` is the listbox. `choose(value)`; where `follows` is set, moving chooses. `keys` has what other keys do:
-  // {Delete: (value) => ...}; `drag(value)` gives what an option that is dragged carries, {type, text}.
-  constructor(root, { choose, follows = false, keys = {}, drag = null }) {
-    Object.assign(this, { root, choose, follows, drag });
+  // {Delete: (value) => ...}; `carry` hears of an option that is dragged away: take(value, dataTransfer), leave(); under a
+  // finger, where there is no dataTransfer, move(x, y) and drop(x, y) too.
+  constructor(root, { choose, follows = false, keys = {}, carry = null }) {
+    Object.assign(this, { root, choose, follows, carry });
+    if (carry)
+      watchPull(root, (target) => target.closest("[role=option]"), {
+        ...carry,
+        take: ({ dataset }) => carry.take(dataset.value, null),
+      });
     root.addEventListener("click", ({ target }) => {
       const option = target.closest("[role=option]");
       if (!option) return;
@@ -71,7 +78,7 @@ export class PictureList {
         image,
         name,
       );
-      if (this.drag) this.#carry(node, value);
+      if (this.carry) this.#offer(node, value);
       this.#options.set(value, { node, image, name });
       paint?.(image, value);
     }
@@ -85,13 +92,13 @@ export class PictureList {
     if (focused?.isConnected) focused.focus();
   }
 
-  #carry(node, value) {
+  #offer(node, value) {
     node.draggable = true;
     node.addEventListener("dragstart", ({ dataTransfer }) => {
-      const { type, text } = this.drag(value);
-      dataTransfer.setData(type, text);
       dataTransfer.effectAllowed = "copy";
+      this.carry.take(value, dataTransfer);
     });
+    node.addEventListener("dragend", () => this.carry.leave());
   }
 
   // The one that the Tab key stops at, or null.

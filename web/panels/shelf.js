@@ -4,7 +4,7 @@
 import { fetchPreset } from "../server/api.js";
 import { OWN } from "../document/editor.js";
 import { carried, pictured } from "../document/material-set.js";
-import { pointer } from "../lib/patch.js";
+import { Carrier } from "./carrier.js";
 import { PictureList } from "../lib/picture-list.js";
 import { element } from "../lib/dom.js";
 import { inWords } from "../lib/format-text.js";
@@ -12,9 +12,9 @@ import { watchChoice } from "../lib/tabs.js";
 
 const ALL = "all";
 const SAVED = "saved";
+const SAVED_START = new RegExp(`^${SAVED} `);
 const NONE = "(none)";
-const LIBRARY = "application/x-sunbox-library"; // a material of the library, and one of the scene, that is dragged
-const SCENE = "application/x-sunbox-material";
+const PAGE = crypto.getRandomValues(new Uint32Array(2)).join("-"); // tells its own materials from another page's
 
 // A title without what stands in brackets: there is no room for that under a picture.
 const short = (title) => title.replace(/ \(.*\)$/, "");
@@ -25,14 +25,15 @@ export class Shelf {
   #materials = new Map(); // documents of the library that were fetched
 
   // `find(id)` elements; `library` as openLibrary has it; `acts` the editor; `thumbnails`; `saved` the SavedMaterials or
-  // null; `shapeAt(x, y)` resolves to the index of the shape there or null; `rename(name)`, `remove(name)` of materials.
-  constructor(find, { library, acts, thumbnails, saved, shapeAt, rename, remove }) {
-    Object.assign(this, { find, library, acts, thumbnails, saved, shapeAt });
+  // null; `rename(name)`, `remove(name)` of materials; `carry`: what Carrier needs beside these.
+  constructor(find, { library, acts, thumbnails, saved, rename, remove, carry }) {
+    Object.assign(this, { find, library, acts, thumbnails, saved });
+    const carrier = new Carrier({ ...carry, acts, open: (parcel) => this.#open(parcel) });
     this.materials = new PictureList(find("materials"), {
       choose: (name) => acts.pickMaterial(name),
       follows: true,
       keys: { Delete: remove, F2: rename },
-      drag: (name) => ({ type: SCENE, text: name }),
+      carry: carrier.source((name) => ({ page: PAGE, name, document: this.#carried(name) })),
     });
     find("materials").addEventListener("dblclick", ({ target }) => {
       const option = target.closest("[role=option]");
@@ -41,7 +42,7 @@ export class Shelf {
     this.shown = new PictureList(find("library"), {
       choose: (value) => this.#assign(value),
       keys: { Delete: (value) => this.#forget(value) },
-      drag: (value) => ({ type: LIBRARY, text: value }),
+      carry: carrier.source((library) => ({ library })),
     });
     this.environments = new PictureList(find("environments"), {
       choose: (name) => acts.pickEnvironment(name === NONE ? null : name),
@@ -55,7 +56,6 @@ export class Shelf {
       library.scenes.map(({ name, title }) => ({ value: name, title, label: short(title) })),
       (image, name) => thumbnails.place(image, "scenes", name),
     );
-    this.#drops(find("stage"));
   }
 
   // --- the library ---
@@ -131,27 +131,16 @@ export class Shelf {
     if (value.startsWith(`${SAVED} `)) this.saved.forget(value.slice(SAVED.length + 1));
   }
 
-  // What is dragged onto the picture goes to what is under the pointer.
-  #drops(stage) {
-    stage.addEventListener("dragover", (event) => {
-      if ([LIBRARY, SCENE].some((type) => event.dataTransfer.types.includes(type))) event.preventDefault();
-    });
-    stage.addEventListener("drop", async (event) => {
-      const { clientX, clientY, dataTransfer } = event;
-      const [taken, own] = [LIBRARY, SCENE].map((type) => dataTransfer.getData(type));
-      if (!taken && !own) return;
-      event.preventDefault();
-      try {
-        const shape = await this.shapeAt(clientX, clientY);
-        if (shape === null) return;
-        const thing = pointer("shapes", shape);
-        if (own) this.acts.edit(`/scene${thing}/material`, own);
-        this.acts.select(thing);
-        if (taken) await this.#assign(taken);
-      } catch (problem) {
-        this.acts.complain(problem);
-      }
-    });
+  // What is carried, by its parcel: of this page a material of the scene, else what can come into any scene.
+  async #open({ page, name, document, library }) {
+    if (page === PAGE) return { name };
+    if (!library) return { document, wanted: name };
+    return { document: await this.#fetch(library), wanted: library.replace(SAVED_START, "") };
+  }
+
+  #carried(name) {
+    const { scene } = this.acts.state;
+    return carried(name, scene.materials[name], scene);
   }
 
   // --- what the state has ---
@@ -164,7 +153,7 @@ export class Shelf {
       const now = pictured(document, scene, image.painted);
       if (now === image.painted) continue;
       image.painted = now;
-      this.thumbnails.own(image, carried(name, document, scene));
+      this.thumbnails.own(image, this.#carried(name));
     }
     this.materials.mark(chosen.material);
     if (this.used && this.#materials.get(this.used) !== scene.materials[chosen.material]) this.used = null;

@@ -154,7 +154,7 @@ export class ViewportController {
 
   async shapeAt(x, y) {
     const place = this.viewport.place(x, y);
-    return place && this.picker.shape(this.acts.state.scene, place);
+    return place && this.picker.shape(this.acts.steady.scene, place);
   }
 
   async select(place) {
