@@ -196,6 +196,27 @@ def test_numbers_are_read_as_people_write_them(page: Page, text: str) -> None:
 def test_a_number_may_say_its_own_unit_and_no_share_of_it(page: Page) -> None:
     assert call(page, "lib/number.js", "parseNumber", "30\u00b0", "\u00b0") == 30
     assert call(page, "lib/number.js", "parseNumber", "50%", "\u00b0") is None
+    for text, unit, number in (
+        ("1 + 20 cm", "m", 1.2),
+        ("3mm / 2", "m", 0.0015),
+        ("3.14159265359 rad", "\u00b0", 180),
+        ("1,5 min", "s", 90),
+        ("2 W/(m\u00b2 sr)", "W/(m\u00b2 sr)", 2),
+        ("512 px", "pixels", 512),
+    ):
+        assert call(page, "lib/number.js", "parseNumber", text, unit) == pytest.approx(number), text
+    for text, unit in (("2 cm", ""), ("2 furlongs", "m"), ("2 cm", "\u00b0"), ("cm", "m")):
+        assert call(page, "lib/number.js", "parseNumber", text, unit) is None, text
+
+
+def test_colours_are_read_as_people_write_them(page: Page) -> None:
+    blue = call(page, "lib/color.js", "parseColor", "#00aaff")
+    assert blue == pytest.approx([0, 0.401978, 1], abs=1e-5)
+    for text in ("#0af", "0af", "00AAFF", " rgb(0, 170, 255) ", "rgb(0 170 255)", "hsl(200 100% 50%)"):
+        assert call(page, "lib/color.js", "parseColor", text) == blue, text
+    assert call(page, "lib/color.js", "parseColor", "white") == [1, 1, 1]
+    for text in ("", "blau", "0.2 0.4 0.6", "#0a", "rgb(0 0 0 / 50%)", "inherit", "url(x)"):
+        assert call(page, "lib/color.js", "parseColor", text) is None, text
 
 
 TRIPLES = ["0.2 0.4 0.6", "0,2 0,4 0,6", "0.2, 0.4, 0.6", "0.2,0.4,0.6", "0,2; 0,4; 0,6", "20% 2/5 .6"]

@@ -2,11 +2,12 @@
 // the hand moves and `commit` when it comes to rest. `undefined` stands for "as the server likes". `refuse`
 // says what was wrong with something written, `restore` goes back to the value there was.
 
-import { HEX, hex, linear } from "../lib/color.js";
+import { hex, linear, parseColor } from "../lib/color.js";
 import { element, isBeingEdited } from "../lib/dom.js";
 import { slideByTouch } from "../lib/sliding.js";
 import { neededIn, parseNumber, parseTriple } from "../lib/number.js";
 import { compact, inWords, unitText } from "../lib/format-text.js";
+import { scrubBy } from "../lib/scrub.js";
 import { span } from "../lib/span.js";
 
 const UNSET = "–"; // neither document nor schema has a value
@@ -32,16 +33,32 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     input(value);
     commit();
   };
-  const step = (steps) => {
-    const from =
-      parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
-    const to = Number((from + steps * scale.stepAt(from)).toPrecision(12));
-    const { min, max, open } = field;
+  const now = () =>
+    parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
+  const { min = -Infinity, max = Infinity, open } = field;
+  const give = (value) => {
+    const to = Number(value.toPrecision(12));
     if (to < min || to > max || to <= open.min || to >= open.max) return;
     clean();
     input(to);
     box.value = compact(to);
+  };
+  const step = (steps) => {
+    const from = now();
+    give(from + steps * scale.stepAt(from));
     box.select();
+  };
+  let begun = null; // {latest, from}: where a drag of the label began
+  const drag = {
+    begin: () => {
+      begun = { latest, from: latest ?? now() };
+    },
+    move: (steps) => give(Math.min(Math.max(begun.from + steps * scale.stepAt(begun.from), min), max)),
+    end: commit,
+    cancel: () => {
+      input(begun.latest ?? undefined);
+      commit();
+    },
   };
   const box = element("input", {
     type: "text",
@@ -82,7 +99,7 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     box.value = latest === null ? "" : compact(latest);
     box.title = latest === null || box.value === String(latest) ? "" : String(latest);
   };
-  return { element: box, show };
+  return { element: box, show, drag };
 }
 
 function track(field, id, { input, commit }) {
@@ -129,6 +146,7 @@ function slider(field, id, events) {
   entry.element.setAttribute("aria-label", `${field.title}, number`);
   return {
     element: element("div", { class: "slider" }, range.element, entry.element),
+    drag: entry.drag,
     show(value, effective, ends) {
       range.show(value, effective, ends);
       entry.show(value, effective, ends);
@@ -195,7 +213,7 @@ function vector(field, id, { input, commit, refuse, restore }) {
         element(
           "span",
           { class: "axis", "data-axis": names[i] },
-          element("i", { "aria-hidden": "true" }, names[i].charAt(0).toUpperCase()),
+          scrubBy(element("i", { "aria-hidden": "true" }, names[i].charAt(0).toUpperCase()), entry.drag),
           entry.element,
         ),
       ),
@@ -247,11 +265,11 @@ function color(field, id, { input, commit, refuse, restore }) {
     onchange: () => {
       delete text.dataset.dirty;
       if (text.value === "" && !isSet) return restore();
-      const match = HEX.exec(text.value.trim());
+      const known = parseColor(text.value);
       const triple = parseTriple(text.value);
-      if (match) input(linear(match[0]).map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
+      if (known) input(known.map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
       else if (triple) input(triple);
-      else return refuse("Write #rrggbb, or three linear numbers such as 0.2 0.4 0.6.");
+      else return refuse("Write #rrggbb, rgb(), hsl(), or three linear numbers such as 0.2 0.4 0.6.");
       commit();
     },
   });

@@ -8,6 +8,7 @@ import { folds } from "./folds.js";
 import { acceptFiles } from "../lib/files.js";
 import { equal, isObject } from "../lib/patch.js";
 import { followed } from "../server/schema.js";
+import { scrubBy } from "../lib/scrub.js";
 import { endsOf } from "../lib/span.js";
 import { describe } from "../lib/tooltip.js";
 import { unitText } from "../lib/format-text.js";
@@ -59,6 +60,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
     const unit = unitText(field.unit);
     label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
   }
+  if (widget.drag) scrubBy(label, widget.drag);
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
   const image = field.takesTexture
     ? slot?.(field, () => {

@@ -13,6 +13,20 @@ export function linear(color) {
   return [bits >> 16, (bits >> 8) & 255, bits & 255].map((byte) => toLinear(byte / 255));
 }
 
+// Linear [r, g, b] of a colour as people write it: #rrggbb and #rgb, also without the #, and what CSS knows, such as
+// rgb(0 170 255), hsl(200 100% 50%) and names. Null for others, and for what can be seen through.
+export function parseColor(text) {
+  const plain = text.trim();
+  const wanted = /^([0-9a-f]{3}|[0-9a-f]{6})$/i.test(plain) ? `#${plain}` : plain;
+  const context = new OffscreenCanvas(1, 1).getContext("2d");
+  const [found, other] = ["#000000", "#ffffff"].map((before) => {
+    context.fillStyle = before; // which stays where the words are no colour
+    context.fillStyle = wanted;
+    return context.fillStyle;
+  });
+  return found === other && HEX.test(found) ? linear(found) : null;
+}
+
 // "#rrggbb" (sRGB) of a linear colour; what does not fit into 0..1 is cut off.
 export const hex = (color) =>
   "#" +

@@ -1,16 +1,27 @@
 // Numbers as people write them: decimals with a comma, shares in per cent, small sums. Nothing is guessed: what
 // is no number is null.
 
-const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(\s*%)?|([-+*/()]))/giy;
+const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?:\s*([^\s\d.+*/()-]+))?|([-+*/()]))/giy;
 
-function tokens(text) {
+// Other units that may stand behind a number, as factors of the field's own.
+const UNITS = {
+  m: { km: 1000, cm: 0.01, mm: 0.001, µm: 1e-6, nm: 1e-9, in: 0.0254, ft: 0.3048 },
+  "°": { deg: 1, rad: 180 / Math.PI },
+  s: { ms: 0.001, min: 60, h: 3600 },
+  pixels: { px: 1 },
+};
+
+// Numbers, each in the field's unit, and signs; null where there is anything else.
+function tokens(text, unit) {
+  const factors = { ...UNITS[unit], ...(unit ? { [unit]: 1 } : { "%": 0.01 }) }; // a share of what, where there is a unit?
   const found = [];
   TOKEN.lastIndex = 0;
   while (TOKEN.lastIndex < text.length) {
     const match = TOKEN.exec(text);
     if (!match) return null;
-    const [, digits, share, sign] = match;
-    found.push(sign ?? Number(digits) / (share ? 100 : 1));
+    const [, digits, own, sign] = match;
+    if (own && !Object.hasOwn(factors, own)) return null;
+    found.push(sign ?? Number(digits) * (own ? factors[own] : 1));
   }
   return found;
 }
@@ -39,15 +50,13 @@ function calculate(rest) {
   return rest.length ? NaN : value;
 }
 
-// The number that a text says, or null: "0,35", "1/3", "50 %", "2 * (1 + .5)", "16 777 216", "30°" with the
-// unit "°". A comma beside a point could mean thousands or decimals, so that is no number.
+// The number that a text says, or null: "0,35", "1/3", "50 %", "2 * (1 + .5)", "16 777 216"; with a unit also in that one
+// or its kin: "30°", "0.5 rad", "1 + 20 cm". A comma beside a point could mean thousands or decimals, so that is no number.
 export function parseNumber(text, unit = "") {
   let plain = text.trim().replaceAll("\u2212", "-");
-  if (unit && plain.endsWith(unit)) plain = plain.slice(0, -unit.length);
+  if (unit && !UNITS[unit] && plain.endsWith(unit)) plain = plain.slice(0, -unit.length).trimEnd(); // such as W/(m² sr)
   if (plain.includes(",") && plain.includes(".")) return null;
-  plain = plain.replaceAll(",", ".").replaceAll(/(?<=\d)[\s\u202f](?=\d{3}(?!\d))/g, "");
-  if (unit && plain.includes("%")) return null; // of what?
-  const found = tokens(plain);
+  const found = tokens(plain.replaceAll(",", ".").replaceAll(/(?<=\d)[\s\u202f](?=\d{3}(?!\d))/g, ""), unit);
   const value = found?.length ? calculate(found) : NaN;
   return Number.isFinite(value) ? Number(value.toPrecision(12)) : null;
 }

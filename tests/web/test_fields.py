@@ -1,0 +1,66 @@
+"""Fields follow a hand that drags their label, and take what people write."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.web.conftest import Editor
+from tests.web.editing import document
+
+
+def drag(editor: Editor, label: str, right: float, *, escape: bool = False) -> None:
+    place = editor.page.locator(label)
+    place.scroll_into_view_if_needed()
+    box = place.bounding_box()
+    assert box
+    x, y = box["x"] + 4, box["y"] + box["height"] / 2
+    editor.page.mouse.move(x, y)
+    editor.page.mouse.down()
+    editor.page.mouse.move(x + right, y, steps=5)
+    if escape:
+        editor.page.keyboard.press("Escape")
+    editor.page.mouse.up()
+
+
+def test_a_label_that_is_dragged_changes_its_number(editor: Editor) -> None:
+    page, label = editor.page, "#material-form [data-field=roughness] > label"
+    entry = editor.field("roughness", "number")
+    before = document(editor)
+    drag(editor, label, 40)
+    assert float(page.input_value(entry)) == pytest.approx(0.5), "twenty steps of a hundredth"
+    assert page.evaluate("document.activeElement.id") != page.get_attribute(label, "for"), "it was no click"
+    drag(editor, label, 400)
+    assert page.input_value(entry) == "1", "it stays inside of its range"
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    assert document(editor) == before, "each drag is one step of undo"
+    drag(editor, label, 40, escape=True)
+    assert document(editor) == before
+    page.keyboard.down("Shift")
+    drag(editor, label, -4)
+    page.keyboard.up("Shift")
+    assert float(page.input_value(entry)) == pytest.approx(0.1), "ten steps at once"
+    page.click(label)
+    assert page.evaluate("document.activeElement.id") == page.get_attribute(label, "for")
+
+    # Of three numbers each by its letter.
+    center = [float(each.input_value()) for each in page.locator("#thing-form [data-field=center] input").all()]
+    drag(editor, "#thing-form [data-field=center] [data-axis=Y] > i", 10)
+    moved = document(editor)["shapes"][0]["center"]
+    assert moved[0] == center[0] and moved[1] > center[1] and moved[2] == center[2]
+
+
+def test_colours_and_lengths_are_taken_as_written(editor: Editor) -> None:
+    page = editor.page
+    text, swatch = editor.field("base_color", "text"), editor.field("base_color", "color")
+    for written, shown in (("#0af", "#00aaff"), ("rgb(10, 20, 30)", "#0a141e"), ("hsl(120 100% 25%)", "#008000")):
+        page.fill(text, written)
+        page.press(text, "Enter")
+        assert page.input_value(swatch) == shown
+    page.fill(text, "blau")
+    page.press(text, "Enter")
+    assert "hsl()" in editor.text("[data-field=base_color] .trouble")
+    radius = "#thing-form [data-field=radius] input.number"
+    page.fill(radius, "1/2 + 25 cm")
+    page.press(radius, "Enter")
+    assert document(editor)["shapes"][0]["radius"] == 0.75
