@@ -38,11 +38,11 @@ from service.renderers.pool.devices import missing_device, seats
 from service.renderers.pool.pool import Pool
 from service.renderers.ray.joining import CannotJoin
 from service.renderers.ray.pool import cluster_pool
-from service.renders.queue import QueueLimits, RenderQueue
-from service.renders.retention import Retention
+from service.renders.queue import RenderQueue
+from service.renders.retention import QueueLimits, Retention
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import RequestReader
-from service.routes import assets, bsdf, documents, info, materials, renders, stream
+from service.routes import assets, batches, bsdf, documents, info, materials, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import Files, respond, tell_errors
@@ -101,7 +101,7 @@ def create_app(config: Config) -> FastAPI:
         redoc_url=None,
     )
     app.state.sunbox = state
-    api = (info, preset_routes, assets, documents, renders, materials, bsdf, stream)
+    api = (info, preset_routes, assets, documents, renders, batches, materials, bsdf, stream)
     for router in (each.router for each in api):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)

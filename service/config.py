@@ -206,6 +206,7 @@ class Config(BaseSettings):
         ge=1,
         description="Most renders that wait in line; a key with less than its share may add more.",
     )
+    max_batch: int = Field(10_000, ge=1, le=1_000_000, description="Most renders of one batch.")
     max_jobs: int = Field(2_000, ge=1, description="Most renders, running and waiting, of one key.")
     max_key_assets: Bytes | None = Field(
         None,

@@ -5,7 +5,7 @@ ServiceError
     Unauthorized  Forbidden                               who asks
     NotFound  Conflict  PreconditionFailed  Gone                            what is asked for
     TooLarge  UnsupportedMedia  TimedOut                  how it is sent
-    TooManyRequests  Unavailable  Internal                the service
+    TooManyRequests  Unavailable  NotProvided  Internal   the service
 """
 
 from __future__ import annotations
@@ -130,6 +130,10 @@ class Unavailable(ServiceError):
         self.retry_after = retry_after
 
 
+class NotProvided(ServiceError):
+    """The server lacks a program or a package that this needs, which `detail` names."""
+
+
 class Internal(ServiceError):
     pass
 
@@ -158,6 +162,7 @@ ANSWERS: dict[type[ServiceError], Answer] = {
     UnsupportedMedia: Answer(415, "unsupported-media", "Unsupported media type"),
     TooManyRequests: Answer(429, "too-many-requests", "Too many requests"),
     Unavailable: Answer(503, "unavailable", "Unavailable"),
+    NotProvided: Answer(501, "not-provided", "Not provided by this server"),
     Internal: Answer(500, "internal", "Internal error"),
 }
 

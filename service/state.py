@@ -13,6 +13,9 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
+from service.batches.batch import Batch
+from service.batches.members import Members
+from service.batches.queue import BatchQueue
 from service.config import Config
 from service.http.downloads import Downloads
 from service.operation.readiness import SOFTWARE, Readiness
@@ -60,18 +63,20 @@ class AppState:
     uploads: Shares = field(init=False)  # bytes of files that are being received and parsed, by caller
     readiness: Readiness = field(init=False)
     bsdf: BsdfQuestions = field(init=False)
+    batches: BatchQueue = field(init=False)
     waits: Shares = field(init=False)
 
     def __post_init__(self) -> None:
         self.memory = self.reader.memory
         loader = self.storage.assets.loader
         self.memory.cache("assets", lambda: loader.bytes, loader.shrink)
-        self.memory.cache("pictures", lambda: 0, self.render_queue.shrink)  # renders count themselves
+        self.memory.cache("pictures", lambda: 0, self.render_queue.resting.shrink)  # renders count themselves
         self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)
         self.bodies = Bodies(self.config, self.memory)
         most = max(self.config.max_bodies, 4 * self.config.max_body)
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
+        self.batches = BatchQueue(self.render_queue, self._members, self.config.max_running + 1)
         self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
@@ -103,12 +108,23 @@ class AppState:
             self.render_queue.store = None
             return
         stored = await asyncio.to_thread(store.load)
+        members, batches = await asyncio.to_thread(store.members), await asyncio.to_thread(store.batches.all)
         await store.open()
-        self.render_queue.resume(stored, self._resumed)
+        self.render_queue.resume(stored, self._resumed, self.batches.resume(batches), members)
+        self.batches.go_on()
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A new render. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
+        waiting = self.render_queue.packed
+        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
+
+    def _members(self, batch: Batch, body: bytes) -> Members:
+        return Members(batch, body, self.reader, self._member)
+
+    def _member(self, order: Order, document: bytes | None, packed: Packed | None) -> Job:
+        """A new render of a batch. Raises TooLarge for one that never fits into the memory."""
+        outcome = Outcome(warnings=list(packed.warnings) if packed is not None else [])
         waiting = self.render_queue.packed
         return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
 
@@ -143,6 +159,7 @@ class AppState:
         self.renderers.drain()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
+        await self.batches.close()
         await self.render_queue.close()
         while self.sessions.attended and time.monotonic() < until:
             await asyncio.sleep(0.01)

@@ -48,6 +48,7 @@ LAYERS = [
     {"service.requests"},
     {"service.renderers"},
     {"service.renders"},
+    {"service.batches"},
     {"service.streams"},
     {"service.worker"},
     {"service.http"},

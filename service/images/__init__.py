@@ -1,8 +1,10 @@
 """Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
 
-encoders  how each format is written
-metadata  the metadata of PNG and EXR files
-recipe    the scene and settings that a picture was made from, in that metadata
+encoders       how each format is written
+metadata       the metadata of PNG and EXR files
+recipe         the scene and settings that a picture was made from, in that metadata
+contact_sheet  many pictures on one, each with its name
+animation      pictures one after the other
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from service.images.encoders import (
     Choices,
     Metadata,
     in_memory,
+    over_black,
     write_exr,
     write_exr_layers,
     write_hdr,
@@ -34,6 +37,7 @@ __all__ = [
     "LAYERS",
     "encode",
     "encode_layers",
+    "over_black",
     "read_metadata",
     "write",
     "write_layers",

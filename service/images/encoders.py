@@ -46,7 +46,7 @@ def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     """Write a JPEG, over black, as it has no alpha."""
     quality = QUALITY if choices.quality is None else choices.quality
     sampling = "4:4:4" if quality >= FULL_COLOUR else "4:2:0"
-    file.write(_pillow(_over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling))
+    file.write(_pillow(over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling))
 
 
 def write_webp(file: BinaryIO, pixels: Array, choices: Choices) -> None:
@@ -152,7 +152,7 @@ def _unit(pixels: Array) -> npt.NDArray[np.float32]:
     return np.clip(pixels, 0, 1).astype(np.float32)
 
 
-def _over_black(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+def over_black(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     if pixels.shape[2] != 4:
         return pixels
     alpha = pixels[:, :, 3:]

@@ -13,9 +13,11 @@ scene       its scene: as a document while it waits, packed when it begins
 memory      what a render takes in memory
 documents   what the documents of renders that wait take on the disk, by owner
 retention   which ended renders make room
+resting     ended renders whose pictures stay with the renderer
 recorder    writes what becomes of a render to the store
 waiting     waits for an event, for a time
 followers   who follows renders, and learns of their changes
+listing     lists of renders, a page at a time
 reads       requests for a picture that the renderer has not answered yet
 status      the status of a render, as callers see it
 store       renders on the disk

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from service.problems import ServiceError, Unavailable
 from service.renderers.protocol import Renderers
@@ -19,6 +19,27 @@ from service.system.executors import packing
 log = logging.getLogger(__name__)
 
 
+@runtime_checkable
+class InBatch(Protocol):
+    """A batch, as its renders and their queue see it: it is kept, and makes room, as a whole."""
+
+    id: str
+    owner: str
+    client: str  # whose share of the disk its document counts towards
+    bytes: int  # of that document
+    number: int  # of its row in the store
+    ended_at: float  # by the monotonic clock
+    gone: bool  # whether it made room for others, or was deleted
+    jobs: dict[int, Any]  # by step
+
+    @property
+    def size(self) -> int: ...
+
+    def add(self, step: int, render: Any) -> None: ...
+
+    def ended(self, render: Any) -> None: ...
+
+
 class Ordered:
     """A render as it stands in line. What a renderer has of it is for Rendering and PictureViewer."""
 
@@ -26,6 +47,7 @@ class Ordered:
     number = 0  # rises in the order of arrival
     place = 0  # among those of its owner that wait
     waits = False  # for memory, the disk or a renderer, which was logged
+    batch: InBatch | None = None  # which has the document, and learns of the end
     task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it
 
     def __init__(self, renderers: Renderers, order: Order, life: Life, scene: RenderScene) -> None:

@@ -3,60 +3,38 @@
 from __future__ import annotations
 
 import asyncio
-import concurrent.futures
 import contextlib
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Collection, Coroutine, Iterator
+from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from typing import Any
 
 from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.renders import listing
 from service.renders.documents import WaitingDocuments
 from service.renders.followers import Follower, Followers
 from service.renders.job import Job
 from service.renders.life import PictureAt
+from service.renders.ordered import InBatch
 from service.renders.recorder import Recorder
-from service.renders.retention import KeptRenders, Retention
+from service.renders.resting import Resting
+from service.renders.retention import KeptRenders, QueueLimits
 from service.renders.scene import PackedScenes
 from service.renders.slots import Slots
+from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.renders.store.rows import REMEMBERED
 from service.renders.store.store import RenderStore
 from service.storage.quota import QuotaUsedUp
 
 RETRY_S = 5  # when to ask again where there is no room
-# Bytes of scenes and pictures of ended renders that stay with the renderer, so that looking at them takes no time;
-# the last one stays however large it is. The others come back from the disk.
-RESTING_BYTES = 256 << 20
-SHRINK_S = 0.5  # how long a thread waits for the event loop to free memory
 CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
 EVICTION_S = 60.0  # at most between two looks for renders that are too old
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class QueueLimits:
-    """How many renders run and wait at once, and which of the ended ones are kept."""
-
-    running: int  # renders; the others wait, as each has its scene and its picture on the GPU
-    waiting: int
-    each: int  # running and waiting, of one owner
-    retention: Retention
-    disk_bytes: int | None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
-
-
-@dataclass(frozen=True)
-class Page:
-    """Renders, the newest first, and whether there are more."""
-
-    renders: list[Job]
-    more: bool
 
 
 class RenderQueue:
@@ -75,17 +53,25 @@ class RenderQueue:
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._documents = WaitingDocuments(self._limits.disk_bytes)
-        self._kept: KeptRenders[Job] = KeptRenders(self._limits.retention)
-        self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
+        self._kept: KeptRenders[Job | InBatch] = KeptRenders(self._limits.retention)
+        self.resting = Resting()
         self._chores: set[asyncio.Task[None]] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self.closing = False
 
-    def resume(self, stored: Collection[StoredRender], make: Callable[[StoredRender], Job]) -> None:
-        """Take up what the store has: ended ones are kept, the others go on or wait."""
+    def resume(
+        self,
+        stored: Collection[StoredRender],
+        make: Callable[[StoredRender], Job],
+        batches: Collection[InBatch] = (),
+        members: Mapping[str, tuple[int, int]] | None = None,
+    ) -> None:
+        """Take up what the store has: ended ones are kept, the others go on or wait. `members`: by the ids of renders
+        of batches the batch's number and the step."""
         assert self.store is not None
-        self._loop = asyncio.get_running_loop()
+        known = {batch.number: batch for batch in batches}
+        for batch in batches:
+            self._documents.count(batch, batch.bytes)
         for each in stored:
             if each.gone:
                 self._remember(each.order.id, each.order.owner, each.number)
@@ -94,13 +80,16 @@ class RenderQueue:
             job.number = self._number = each.number
             whole = each.outcome.state in ENDED
             job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers, job.owner)
-            job.changes.followers = self._followers
             self._jobs[job.id] = job
+            if (place := (members or {}).get(job.id)) is not None:
+                known[place[0]].add(place[1], job)
+            else:
+                job.changes.followers = self._followers
             if not job.finished.is_set():
                 self._slots.add(job)
                 self._documents.count(job, job.order.bytes)
         for job in sorted(self._jobs.values(), key=lambda job: job.ended_at):
-            if job.finished.is_set():
+            if job.finished.is_set() and job.batch is None:
                 self._kept.add(job)
         if self._jobs:
             log.info("took up stored renders", {"waiting": len(self._waiting), "ended": self.kept})
@@ -115,7 +104,6 @@ class RenderQueue:
         `uses`: the assets that it refers to. The caller releases one that is not `listed`. Raises TooManyRequests
         where its owner has as many under way as one may have, Unavailable where the queue or the disk is full.
         """
-        self._loop = asyncio.get_running_loop()
         self.admit(job.owner)
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
@@ -130,6 +118,29 @@ class RenderQueue:
         self._slots.dispatch()
         if job in self._waiting:
             job.set_aside()
+
+    async def submit_member(self, job: Job, batch: InBatch, step: int) -> None:
+        """Queue a render of a batch, as `submit`: it is not listed, and stays for as long as its batch does."""
+        self.admit(job.owner)
+        if self.store is not None:
+            self._storing[job.owner] += 1
+            try:
+                job.number = await self.store.insert_member(job.order, job.outcome, batch.number, step)
+            finally:
+                self._storing[job.owner] -= 1
+            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
+        self.take_member(job, batch, step)
+
+    def take_member(self, job: Job, batch: InBatch, step: int) -> None:
+        """A render of a batch is there, and waits if it has not ended."""
+        self._number = job.number = max(job.number, self._number + 1)
+        self._jobs[job.id] = job
+        batch.add(step, job)
+        if not job.finished.is_set():
+            self._slots.add(job)
+            self._slots.dispatch()
+            if job in self._waiting:
+                job.set_aside()
 
     def admit(self, owner: str) -> None:
         """Raise what `submit` would raise, before a scene is read for nothing."""
@@ -160,29 +171,20 @@ class RenderQueue:
         state: State | None = None,
         limit: int = 200,
         after: str | None = None,
-    ) -> Page:
+    ) -> listing.Page:
         """An owner's renders, the newest first, of that label and state; those that were asked for before `after`.
 
         Raises InvalidDocument where there never was a render `after`.
         """
         last = None if after is None else self._place(after, owner)
-        fits = (
-            job
-            for job in reversed(self._jobs.values())
-            if job.owner == owner
-            and (last is None or job.number < last)
-            and label in (None, job.order.label)
-            and state in (None, job.state)
-        )
-        found = list(islice(fits, limit))
-        return Page(found, more=len(found) == limit and next(fits, None) is not None)
+        return listing.page(reversed(self._jobs.values()), owner, label, state, limit, last)
 
     @contextmanager
     def follower(self, owner: str) -> Iterator[Follower[Job]]:
         """Learns of every change of an owner's renders; first of those that are under way."""
         with self._followers.follower(owner) as follower:
             for job in self._jobs.values():
-                if job.owner == owner and not job.finished.is_set():
+                if job.owner == owner and job.batch is None and not job.finished.is_set():
                     follower.add(job)
             if self.closing:
                 follower.close()
@@ -215,7 +217,7 @@ class RenderQueue:
             yield
         finally:
             if job.finished.is_set() or job.picture_at is PictureAt.BOTH:
-                self._rest(job)
+                self.resting.add(job)
 
     async def close(self) -> None:
         """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""
@@ -268,13 +270,16 @@ class RenderQueue:
 
     def _ran(self, job: Job) -> None:
         if job.finished.is_set() and job.id in self._jobs:
-            self._rest(job)
+            self.resting.add(job)
         self._ended(job)
 
     def _ended(self, job: Job) -> None:
         self._documents.release(job)
         if job.finished.is_set() and job.id in self._jobs:
-            self._kept.add(job)
+            if job.batch is None:
+                self._kept.add(job)
+            else:
+                job.batch.ended(job)
         self._evict()
 
     def cancel(self, job: Job) -> None:
@@ -288,8 +293,34 @@ class RenderQueue:
     async def _weigh(self, job: Job) -> None:
         """Count what is stored of a cancelled render, once it is."""
         await job.recorded()
-        if job.id in self._jobs:
+        if job.id in self._jobs and job.batch is None:
             self._kept.add(job)
+
+    def keep(self, batch: InBatch) -> None:
+        """Its last render has ended: from now on it may make room for others."""
+        self._documents.release(batch)
+        self._kept.add(batch)
+        self._evict()
+
+    async def store_batch(
+        self, batch: InBatch, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
+    ) -> int:
+        """The number of a batch in the store. Raises Unavailable, TooManyRequests."""
+        if self.store is None:
+            return 0
+        self._documents.take(batch, order.bytes)
+        try:
+            return await self.store.insert_batch(order, body, uses, key)
+        except BaseException:
+            self._documents.release(batch)
+            raise
+
+    async def delete_batch(self, batch: InBatch) -> None:
+        """Forget a batch that has ended, and its pictures. Raises Unavailable where the disk fails."""
+        for job in batch.jobs.values():
+            await job.recorded()
+        self._kept.remove(batch)
+        await self._forget(self._drop([batch]))
 
     async def delete(self, job: Job) -> None:
         """Forget an ended render, its document and its picture. Raises Unavailable where the disk fails."""
@@ -301,47 +332,6 @@ class RenderQueue:
         if job.id in self._jobs:
             self._kept.remove(job)
             self._drop([job])
-
-    def shrink(self, size: int) -> None:
-        """Have ended renders leave the renderer until they have freed that many bytes. For any thread."""
-        loop = self._loop
-        try:
-            elsewhere = loop is not asyncio.get_running_loop()
-        except RuntimeError:
-            elsewhere = True
-        if loop is None or not elsewhere:
-            self._shrink(size)
-            return
-        with contextlib.suppress(concurrent.futures.TimeoutError, RuntimeError):  # busy, or closed
-            asyncio.run_coroutine_threadsafe(self._shrunk(size), loop).result(SHRINK_S)
-
-    async def _shrunk(self, size: int) -> None:
-        self._shrink(size)
-
-    def _shrink(self, size: int) -> None:
-        for job in list(self._resting.values()):
-            if size <= 0:
-                break
-            freed = job.resident_bytes
-            if job.rest():
-                size -= freed
-                del self._resting[job.id]
-
-    def _rest(self, job: Job) -> None:
-        """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
-        self._resting.pop(job.id, None)
-        self._resting[job.id] = job
-        for each in list(self._resting.values()):
-            if not each.finished.is_set() and each.picture_at is not PictureAt.BOTH:
-                del self._resting[each.id]  # it waited, and runs by now
-        total = sum(each.resident_bytes for each in self._resting.values())
-        for each in list(self._resting.values())[:-1]:
-            if total <= RESTING_BYTES:
-                break
-            size = each.resident_bytes
-            if each.rest():
-                total -= size
-                del self._resting[each.id]
 
     def _evict(self) -> None:
         if self.closing:
@@ -356,21 +346,35 @@ class RenderQueue:
         if (left_s := self._kept.left_s(now)) is not None:
             self._timer = asyncio.get_running_loop().call_later(min(EVICTION_S, left_s + 1.0), self._evict)
 
-    def _drop(self, jobs: Collection[Job]) -> list[Recorder]:
-        """Forget renders; their recorders, where they are stored."""
-        for job in jobs:
-            job.release()
-            del self._jobs[job.id]
-            self._resting.pop(job.id, None)
-            self._remember(job.id, job.owner, job.number)
-        return [job.recorder for job in jobs if job.recorder is not None]
+    def _drop(self, goes: Collection[Job | InBatch]) -> list[Recorder | InBatch]:
+        """Forget renders and batches; what the store has to forget of them."""
+        stored = list[Recorder | InBatch]()
+        for each in goes:
+            for job in each.jobs.values() if isinstance(each, InBatch) else [each]:
+                job.release()
+                self._jobs.pop(job.id, None)
+                self.resting.remove(job)
+            if isinstance(each, InBatch):
+                each.gone = True
+                stored.append(each)
+                continue
+            self._remember(each.id, each.owner, each.number)
+            if each.recorder is not None:
+                stored.append(each.recorder)
+        return stored
 
-    async def _forget(self, recorders: list[Recorder]) -> None:
-        assert self.store is not None
-        for recorder in recorders:
+    async def _forget(self, stored: list[Recorder | InBatch]) -> None:
+        if self.store is None:
+            return
+        batches = [each for each in stored if not isinstance(each, Recorder)]
+        recorders = [each for each in stored if isinstance(each, Recorder)]
+        members = [job.recorder for batch in batches for job in batch.jobs.values() if job.recorder is not None]
+        for recorder in recorders + members:
             await recorder.close()
         try:
             await self.store.forget([(recorder.number, recorder.id) for recorder in recorders])
+            for batch in batches:
+                await self.store.forget_batch(batch.number, [job.id for job in batch.jobs.values()])
         except ServiceError as error:
             log.warning("could not delete renders from the disk", {"error": error})
 

@@ -16,6 +16,17 @@ class Retention:
     kept_s: float  # after a render's end
 
 
+@dataclass(frozen=True)
+class QueueLimits:
+    """How many renders run and wait at once, and which of the ended ones are kept."""
+
+    running: int  # renders; the others wait, as each has its scene and its picture on the GPU
+    waiting: int
+    each: int  # running and waiting, of one owner
+    retention: Retention
+    disk_bytes: int | None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
+
+
 class Ended(Protocol):
     @property
     def owner(self) -> str: ...

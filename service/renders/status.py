@@ -21,9 +21,9 @@ def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False)
         "state": outcome.state,
         "label": order.label,
         "priority": order.priority,
-        "created": _iso(order.created_at),
-        "started": _iso(outcome.started_at),
-        "ended": _iso(outcome.ended_at),
+        "created": iso(order.created_at),
+        "started": iso(outcome.started_at),
+        "ended": iso(outcome.ended_at),
         "reason": outcome.reason,
         "samples": progress.samples,
         "noise": progress.noise,
@@ -41,7 +41,7 @@ def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False)
     return known if outcome.problem is None else known | {"problem": outcome.problem}
 
 
-def _iso(seconds: float | None) -> str | None:
+def iso(seconds: float | None) -> str | None:
     """A time since 1970 in UTC, by RFC 3339; None where it is not known."""
     if not seconds:
         return None

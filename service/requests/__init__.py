@@ -2,8 +2,10 @@
 
 request_reader  documents -> packed scenes, with the server's limits and assets
 request_parser  bodies -> scenes and settings, checked
+batch_request   bodies -> a scene and the axes along which it varies, checked
 bsdf_request    bodies -> a material and directions, checked
 conversion_request  bodies -> a material turned into another model
+parsers         what bodies are read as, by name
 parser_pool     large bodies are parsed in processes of their own, within bounds of memory and time
 parser_child    such a process: `python -m service.requests.parser_child`
 bodies          JSON bodies, taken in and parsed

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from service.config import Config
 from service.problems import TooLarge, UnsupportedMedia
 from service.requests.parser_pool import ParserPool
-from service.requests.request_parser import PARSERS, Kind
+from service.requests.parsers import PARSERS, Kind
 from service.scene.text import most_bytes
 from service.system.executors import parsing, waiting_for_parsers
 from service.system.memory import Limit, MemoryBudget

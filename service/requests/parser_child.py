@@ -14,7 +14,7 @@ from typing import Any
 from service.config import Config
 from service.ipc import channel
 from service.problems import ServiceError, TooLarge
-from service.requests.request_parser import PARSERS, Kind
+from service.requests.parsers import PARSERS, Kind
 from service.system.confined import begin, bounded
 from service.system.shared_memory import trim
 

@@ -16,7 +16,8 @@ from service.config import MIB, Config
 from service.ipc import channel
 from service.problems import ServiceError, TooLarge, Unavailable
 from service.requests.parser_child import Failed, Work
-from service.requests.request_parser import Kind, ParsedRequest
+from service.requests.parsers import Kind
+from service.requests.request_parser import ParsedRequest
 from service.scene import MeshShape
 from service.scene.text import most_bytes
 from service.system.child_processes import Child, Children, Closed
@@ -31,6 +32,7 @@ ANSWERS = {
     "service.storage.documents",
     "service.problems",
     "service.quality",
+    "service.requests.batch_request",
     "service.requests.bsdf_request",
     "service.requests.parser_child",
     "service.requests.request_parser",

@@ -5,23 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
 from service.config import Config
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings, resolve
-from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
-from service.requests.conversion_request import parse_conversion
 from service.scene import Scene, load_json, merge_patch, parse_scene, parse_settings, references
 from service.scene.base import Model
 from service.scene.document import Parsed
 from service.scene.validation import both, validated
-from service.storage.documents import checked
 
 LONGEST_LABEL = 200  # characters
 HIGHEST_PRIORITY = 10
@@ -32,13 +28,13 @@ class _Request(Model):
     settings: Any = Field(default_factory=dict)
 
 
-class _RenderRequest(_Request):
+class RenderRequest(_Request):
     label: Annotated[str, Field(max_length=LONGEST_LABEL)] | None = None
     priority: Annotated[int, Field(ge=-HIGHEST_PRIORITY, le=HIGHEST_PRIORITY)] = 0
 
 
 _REQUEST = TypeAdapter(_Request)
-_RENDER_REQUEST = TypeAdapter(_RenderRequest)
+_RENDER_REQUEST = TypeAdapter(RenderRequest)
 
 
 @dataclass(frozen=True)
@@ -123,18 +119,3 @@ def _plain(value: Any) -> Any:
     if type(value) is dict:
         return {key: _plain(each) for key, each in value.items()}
     return value
-
-
-Kind = Literal["render", "keyed_render", "request", "scenes", "materials", "bsdf", "albedo", "terms", "conversion"]
-# What can be asked of a process that parses large bodies, by name.
-PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
-    "render": lambda config, body: RequestParser(config).render(body),
-    "keyed_render": lambda config, body: RequestParser(config).render(body, keyed=True),
-    "request": lambda config, body: RequestParser(config).request(body),
-    "scenes": lambda config, body: checked("scenes", load_json(body), config),
-    "materials": lambda config, body: checked("materials", load_json(body), config),
-    "bsdf": lambda config, body: parse_values(body),
-    "albedo": lambda config, body: parse_albedo(body),
-    "terms": lambda config, body: parse_terms(body),
-    "conversion": lambda config, body: parse_conversion(body),
-}

@@ -2,6 +2,8 @@
 
 renders      renders over REST
 submission   how a request for a render becomes one that waits
+batches      renders that differ along axes
+batch_files  the pictures of a batch in one file
 events       the progress of renders as server-sent events
 waiting      waits that end when the client goes away
 stream       the stream's WebSocket

@@ -14,9 +14,21 @@ from service.assets.types import Kind
 from service.ipc.messages import Reason
 from service.problems import ANSWERS
 from service.renders.store.record import State
+from service.requests.batch_request import MOST_AXES
 from service.requests.bsdf_request import MOST_SAMPLES
 from service.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
-from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, CONVERSION, MATERIAL, RENDER, SCENE, TERMS
+from service.routes.examples import (
+    ALBEDO,
+    ANY_DOCUMENT,
+    ASSET,
+    BATCH,
+    BSDF,
+    CONVERSION,
+    MATERIAL,
+    RENDER,
+    SCENE,
+    TERMS,
+)
 from service.scene.material import MODELS
 from service.storage import documents
 
@@ -118,6 +130,27 @@ class Render(BaseModel):
     renderers: int = Field(description="How many trace it now.")
     not_divided: str | None = Field(description="Why no more than one may; null where its settings allow it.")
     settings: dict[str, Any] = Field(description="What each knob became; null is no such limit.")
+
+
+class StartedBatch(BaseModel):
+    id: str
+    renders: int
+
+
+class BatchMember(BaseModel):
+    id: str = Field(description="Of the render, known before its turn.")
+    state: State
+
+
+class Batch(BaseModel):
+    id: str
+    state: State = Field(description="`failed` where all renders failed.")
+    label: str | None
+    priority: int
+    created: datetime = Field(description="When it was sent, by the server's clock; UTC.")
+    counts: dict[State, int] = Field(description="Renders in each state.")
+    renders: list[BatchMember] = Field(description="In their order: the last axis runs fastest.")
+    eta_s: float | None = Field(description="As if no other renders waited; null until one of them has ended.")
 
 
 class AssetWarning(BaseModel):
@@ -256,6 +289,19 @@ _NAMED = {
 RENDER_BODY = body(_RENDER, sphere=RENDER)
 RENDER_AGAIN: Responses = {200: {"description": "The body.", "content": {"application/json": {"schema": _RENDER}}}}
 LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAMED}, sphere=RENDER)
+_AXIS = {
+    "anyOf": [reference("Values"), reference("Patches"), reference("Turntable")],
+    "description": "What varies along it.",
+}
+_OVER = {"type": "array", "minItems": 1, "maxItems": MOST_AXES, "items": _AXIS}
+BATCH_BODY = body(
+    {
+        **_RENDER,
+        "required": ["scene", "over"],
+        "properties": _RENDER["properties"] | _NAMED | {"over": _OVER},
+    },
+    roughness=BATCH,
+)
 EVENTS: Responses = {
     200: {"description": "The events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
 }

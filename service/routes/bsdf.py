@@ -14,7 +14,7 @@ from fastapi import APIRouter, Request, Response
 from service.ipc.messages import EvaluateBsdf
 from service.pack import pack_material
 from service.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfRequest
-from service.requests.request_parser import Kind
+from service.requests.parsers import Kind
 from service.routes import answers
 from service.routes.errors import GONE
 from service.routes.waiting import until

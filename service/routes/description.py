@@ -12,6 +12,7 @@ from pydantic.json_schema import models_json_schema
 
 from service import scene
 from service.routes.answers import PROBLEM, Problem
+from service.scene import axes
 
 HERE, THERE = "#/$defs/", "#/components/schemas/"
 
@@ -40,6 +41,12 @@ NAMES = {
     "GET /v1/renders/{id}/events": "followRender",
     "GET /v1/renders/{id}/scene": "getRenderScene",
     "GET /v1/renders/{id}/image": "getRenderImage",
+    "POST /v1/batches": "startBatch",
+    "GET /v1/batches/{id}": "getBatch",
+    "DELETE /v1/batches/{id}": "deleteBatch",
+    "GET /v1/batches/{id}/images.zip": "downloadBatch",
+    "GET /v1/batches/{id}/sheet": "getBatchSheet",
+    "GET /v1/batches/{id}/animation": "getBatchAnimation",
     "POST /v1/materials/convert": "convertMaterial",
     "POST /v1/bsdf": "evaluateBsdf",
     "POST /v1/bsdf/albedo": "getBsdfAlbedo",
@@ -106,9 +113,16 @@ def _documents() -> dict[str, Any]:
             "textures": out["Scene"]["properties"]["textures"],
         },
     }
-    out |= _meshes(out["MeshShape"])
+    out |= _meshes(out["MeshShape"]) | _axes()
     moved: dict[str, Any] = _moved(out)
     return moved
+
+
+def _axes() -> dict[str, Any]:
+    """What varies along the axes of a batch."""
+    kinds = [(kind, "validation") for kind in (axes.Values, axes.Patches, axes.Turntable)]
+    _, defined = models_json_schema(kinds, ref_template=HERE + "{model}")  # type: ignore[arg-type]
+    return dict(defined["$defs"])
 
 
 def _meshes(schema: dict[str, Any]) -> dict[str, Any]:

@@ -17,6 +17,8 @@ SCENE: dict[str, Any] = {
     ],
 }
 RENDER: dict[str, Any] = {"scene": SCENE, "settings": {"width": 256, "height": 256, "max_samples": 16}}
+SWEEP = {"path": "/materials/coat/roughness", "values": [0.1, 0.3, 0.6]}
+BATCH: dict[str, Any] = {"scene": SCENE, "settings": {"width": 64, "height": 64, "max_samples": 16}, "over": [SWEEP]}
 ASSET = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 ANY_DOCUMENT: dict[str, Any] = {"type": "object"}
 METAL: dict[str, Any] = {"type": "metal_rough", "base_color": [1, 0.78, 0.34], "metallic": 1, "roughness": 0.3}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
@@ -93,14 +94,14 @@ class ImageQuery(BaseModel):
     responses=FILES | answers.problems(400, 413, 415, 422, 429, 503),
 )
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
-    view = query.view()
+    query.view()  # before anything is rendered
     job = await submission.one_shot(request)
     try:
         if not await waiting.until(request, job.finished.wait()):
             return Response(status_code=GONE)
         if job.state == "cancelled":
             raise Unavailable("The server is shutting down.")
-        return await _image(request, job, query, view)
+        return await _image(request, job, query)
     finally:
         app_state(request).render_queue.cancel(job)
         job.release()
@@ -170,7 +171,11 @@ async def all_progress(request: Request, label: Label = None) -> Response:
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422, 429),
 )
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False) -> Response:
-    renders = app_state(request).render_queue
+    state = app_state(request)
+    renders = state.render_queue
+    if (place := state.batches.waiting(id, owner_of(request))) is not None:
+        batch, step = place
+        return JSONResponse(batch.waiting_status(step))
     job = renders.get(id, owner_of(request))
     with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
         if wait and not await waiting.until(request, job.life.over.wait(), wait):
@@ -187,7 +192,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
     responses=answers.EVENTS | answers.problems(404, 410, 429),
 )
 async def progress(request: Request, id: answers.RenderId) -> Response:
-    return events.of_one(request, app_state(request).render_queue.get(id, owner_of(request)))
+    return events.of_one(request, _render(request, id))
 
 
 @router.get(
@@ -199,8 +204,7 @@ async def progress(request: Request, id: answers.RenderId) -> Response:
     responses=answers.RENDER_AGAIN | answers.problems(404, 410, 503),
 )
 async def scene(request: Request, id: answers.RenderId) -> Response:
-    state = app_state(request)
-    job = state.render_queue.get(id, owner_of(request))
+    state, job = app_state(request), _render(request, id)
     document = await job.document()
     settings = json.dumps({name: value for name, value in job.order.settings.document().items() if value is not None})
     body = await writing(lambda: f'{{"scene":{unfolded(document)},"settings":{settings}}}'.encode())
@@ -214,10 +218,9 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
     responses=FILES | answers.problems(404, 409, 410, 422, 429, 503),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    renders = app_state(request).render_queue
-    job = renders.get(id, owner_of(request))
-    with renders.looking(job):
-        return await _image(request, job, query, query.view())
+    job = _render(request, id)
+    with app_state(request).render_queue.looking(job):
+        return await _image(request, job, query)
 
 
 @router.delete(
@@ -229,32 +232,55 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
     responses=answers.problems(404, 410, 503),
 )
 async def delete(request: Request, id: answers.RenderId) -> None:
-    renders = app_state(request).render_queue
-    job = renders.get(id, owner_of(request))
+    renders, job = app_state(request).render_queue, _render(request, id)
     if job.finished.is_set():
+        if job.batch is not None:
+            raise Conflict("This render belongs to a batch: delete the batch.")
         await renders.delete(job)
     else:
         renders.cancel(job)
         await job.recorded()
 
 
-async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
+def _render(request: Request, id: str) -> Job:
+    """Raises NotFound, Gone, and Conflict for one of a batch that waits for its turn."""
+    state, owner = app_state(request), owner_of(request)
+    if (place := state.batches.waiting(id, owner)) is not None:
+        place[0].job(place[1])
+    return state.render_queue.get(id, owner)
+
+
+async def _image(request: Request, job: Job, query: ImageQuery) -> Response:
+    query.view()
+    async with present(request.receive) as gone:
+        written = await picture_file(request, job, query, gone)
+    if written is None:
+        return Response(status_code=GONE)
+    return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
+
+
+async def picture_file(
+    request: Request, job: Job, query: ImageQuery, gone: Callable[[], bool] = lambda: False
+) -> Written | None:
+    """The file of a render's picture; None where the client has `gone` before its turn. Raises Conflict before the
+    first sample, and the render's own error where it failed."""
     state, downloads = app_state(request), app_state(request).downloads
     caller = caller_of(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
-    async with present(request.receive) as gone, downloads.turn(caller):
+    async with downloads.turn(caller):
         if gone():
-            return Response(status_code=GONE)
+            return None
         written = downloads.find(key)
         if written is None:
             downloads.admit(caller, _most_bytes(job, query))
             with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
-                written = await _written(downloads, job, query, view)
+                written = await _written(downloads, job, query)
             downloads.keep(caller, key, written)
-    return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
+    return written
 
 
-async def _written(downloads: Downloads, job: Job, query: ImageQuery, view: View) -> Written:
+async def _written(downloads: Downloads, job: Job, query: ImageQuery) -> Written:
+    view = query.view()
     layers: dict[str, np.ndarray] = {}
     samples = 0
     for aov in _aovs(query):

@@ -74,7 +74,7 @@ async def _submitted(
     state: AppState, parsed: ParsedRequest, owner: str, began: float, key: IdempotencyKey | None = None
 ) -> Job:
     state.render_queue.admit(owner)
-    async with _pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
+    async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
         job = await _packed(state, parsed, owner, began)
         await state.render_queue.submit(job, parsed.assets, key)
     return job
@@ -103,7 +103,7 @@ def _turn(state: AppState, owner: str, key: str) -> asyncio.Lock:
 
 
 @asynccontextmanager
-async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
+async def pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
     """A context in which these assets are not deleted. A thread waits for the quota's lock, as that may take
     seconds."""
     if not ids:

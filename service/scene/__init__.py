@@ -12,6 +12,7 @@ validation      what pydantic says, as errors with pointers
 error_location  a pointer into the document, from pydantic's
 text            JSON texts: parsed, weighed and bounded
 patch           JSON merge patches
+axes            what varies from one render of a batch to the next
 references      the assets that a document refers to
 saved_material  a material as users save it, with its textures
 schema          the schema that editors are made from

@@ -25,6 +25,10 @@ _FOREIGN = """
         SELECT 1 FROM render_uses JOIN renders USING (number)
         WHERE render_uses.asset = wanted.value AND renders.owner = :owner AND NOT renders.gone
     )
+    AND NOT EXISTS (
+        SELECT 1 FROM batch_uses JOIN batches USING (number)
+        WHERE batch_uses.asset = wanted.value AND batches.owner = :owner
+    )
 """
 
 

@@ -217,16 +217,15 @@ class Documents:
 
     @contextmanager
     def assets_in_use(self) -> Iterator[set[str]]:
-        """A context with the ids of all assets that saved documents and renders use; none of these is stored
+        """A context with the ids of all assets that saved documents, renders and batches use; none of these is stored
         meanwhile."""
         if not self._database.exists():
             yield set()
             return
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
-            yield {
-                asset for (asset,) in database.execute("SELECT asset FROM uses UNION SELECT asset FROM render_uses")
-            }
+            every = "SELECT asset FROM uses UNION SELECT asset FROM render_uses UNION SELECT asset FROM batch_uses"
+            yield {asset for (asset,) in database.execute(every)}
 
     def usage(self) -> Usage:
         """Bytes of the database, without its unused pages."""

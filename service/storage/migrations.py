@@ -126,5 +126,24 @@ MIGRATIONS = (
             "CREATE INDEX renders_by_base ON renders (base)",
         ),
     ),
+    Migration(
+        "batches, whose renders have no documents of their own",
+        (
+            # The body stands last, as it is read seldom. `key` is the idempotency key of the request.
+            """CREATE TABLE batches (
+                number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL, label TEXT,
+                priority INTEGER NOT NULL, created_at REAL NOT NULL, renders INTEGER NOT NULL, bytes INTEGER NOT NULL,
+                key TEXT, digest TEXT, cancelled INTEGER NOT NULL DEFAULT 0, axes TEXT NOT NULL, body BLOB NOT NULL
+            )""",
+            """CREATE TABLE batch_uses (
+                asset TEXT NOT NULL, number INTEGER NOT NULL, PRIMARY KEY (number, asset)
+            ) WITHOUT ROWID""",
+            "CREATE INDEX batch_uses_by_asset ON batch_uses (asset)",
+            # A render's batch by its number, and the place in it.
+            "ALTER TABLE renders ADD COLUMN batch INTEGER",
+            "ALTER TABLE renders ADD COLUMN step INTEGER",
+            "CREATE INDEX renders_by_batch ON renders (batch) WHERE batch IS NOT NULL",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -38,6 +38,7 @@ MADE_BY = {
     "5": "4213a40",
     "6": "5250b9c",
     "7": "2bdc3dd",
+    "8": "944d792",
 }
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")
@@ -90,15 +91,13 @@ def _fill(folder: Path) -> None:
     first.http.put("/v1/documents/materials/grey", json=grey).raise_for_status()
     assert first.stop() == 0
 
-    second = Server(
-        folder,
-        warms=False,
-        SUNBOX_API_KEY="anna",
-        SUNBOX_MAX_RUNNING="1",
-        SUNBOX_KEEP_RENDERS="3",
-        SUNBOX_CHECKPOINT_S="0.1",
-    )
-    second.http.headers.update(KEY)
+    def started() -> Server:
+        limits = {"SUNBOX_MAX_RUNNING": "1", "SUNBOX_KEEP_RENDERS": "3", "SUNBOX_CHECKPOINT_S": "0.1"}
+        server = Server(folder, warms=False, SUNBOX_API_KEY="anna", **limits)
+        server.http.headers.update(KEY)
+        return server
+
+    second = started()
 
     def sent(samples: int, label: str, of: Any = SCENE, key: str = "") -> str:
         body = {"scene": of, "settings": {**TINY, "max_samples": samples, "denoise": False}, "label": label}
@@ -118,6 +117,10 @@ def _fill(folder: Path) -> None:
     for file in (folder / "data" / "assets").glob(lost.removeprefix("sha256:") + "*"):
         file.unlink()
     while not (folder / "data" / "renders" / f"{cancelled}.checkpoint").exists():
+        time.sleep(0.01)
+    kill(second)
+    second = started()  # which packs again what waits
+    while second.http.get(f"/v1/renders/{cancelled}").json()["state"] != "running":
         time.sleep(0.01)
     second.http.delete(f"/v1/renders/{cancelled}").raise_for_status()
     assert ended(failed) == "failed"

@@ -71,7 +71,7 @@ def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, ren
     if render.unfit is not None:
         yield f"its row cannot be read: {render.unfit}"
         return
-    row = database.execute(_document(database), (render.number,)).fetchone()
+    row = database.execute(_document(database), (render.number,)).fetchone() or _of_batch(database, render.number)
     if row is None:
         yield "its document is not there"
     for name, body in zip(("document", "patch"), row or (), strict=False):
@@ -104,6 +104,15 @@ def _document(database: sqlite3.Connection) -> str:
     """The query for a render's document; an earlier version, whose file is not migrated yet, has one for each."""
     shared = any(column[1] == "base" for column in database.execute("PRAGMA table_info(renders)"))
     return DOCUMENT if shared else "SELECT body FROM render_documents WHERE number = ?"
+
+
+def _of_batch(database: sqlite3.Connection, number: int) -> tuple[bytes] | None:
+    """What a render's batch varies, where it is one of a batch."""
+    if not any(column[1] == "batch" for column in database.execute("PRAGMA table_info(renders)")):
+        return None
+    query = "SELECT body FROM batches JOIN renders ON renders.batch = batches.number WHERE renders.number = ?"
+    found: tuple[bytes] | None = database.execute(query, (number,)).fetchone()
+    return found
 
 
 def _is_kept(folder: Path, render: StoredRender) -> bool:

@@ -91,6 +91,37 @@ class RenderRows:
                 )
         return number
 
+    def insert_member(self, order: Order, outcome: Outcome, batch: int, step: int) -> int:
+        """Store a render that waits, whose document is that of a batch at a step; its number."""
+        with self._database.open() as database, database:
+            settings = settings_json(order.settings)
+            values = (order.id, order.owner, order.label, order.priority, order.created_at, settings, order.bytes)
+            number = database.execute(
+                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, outcome, "
+                "batch, step) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (*values, outcome.state, outcome.json(), batch, step),
+            ).lastrowid
+        assert number is not None
+        return number
+
+    def members(self) -> dict[str, tuple[int, int]]:
+        """By the ids of renders of batches: the batch's number, and the step."""
+        if not self._database.exists():
+            return {}
+        with self._database.open() as database:
+            rows = database.execute("SELECT id, batch, step FROM renders WHERE batch IS NOT NULL")
+            return {id: (batch, step) for id, batch, step in rows}
+
+    def step(self, number: int) -> tuple[bytes, str, int] | None:
+        """Of a render of a batch: what varies, along which axes, and the step; None for any other render."""
+        with self._database.open() as database:
+            found: tuple[bytes, str, int] | None = database.execute(
+                "SELECT batches.body, axes, step FROM renders JOIN batches ON batches.number = batch "
+                "WHERE renders.number = ?",
+                (number,),
+            ).fetchone()
+        return found
+
     def update(self, number: int, outcome: Outcome) -> None:
         values = (outcome.state, outcome.ended_at, outcome.json(), number)
         with self._database.open() as database, database:

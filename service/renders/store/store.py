@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import shutil
 import tempfile
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -19,9 +20,11 @@ from typing import TypeVar
 
 from service.ipc.messages import Progress, Restore
 from service.problems import ServiceError, Unavailable
+from service.renders.store.batch_rows import BatchOrder, BatchRows
 from service.renders.store.pictures import KINDS, DamagedPicture, Kind, PictureFiles
 from service.renders.store.record import ENDED, IdempotencyKey, Order, Outcome, StoredRender
 from service.renders.store.rows import RenderRows
+from service.requests.batch_request import document_of_step
 from service.requests.request_parser import patched
 from service.storage.database import Database
 from service.storage.stores import RENDERS
@@ -38,6 +41,7 @@ from service.system.executors import (
 log = logging.getLogger(__name__)
 
 RETRY_S = 30
+MAKING = ".batch-"  # how the names of folders begin in which files of several pictures are made
 LARGE = 16 << 20  # bytes of a picture, which take 0.1 s of a middling disk
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -54,6 +58,7 @@ class RenderStore:
     ) -> None:
         self._folder = folder
         self._rows = RenderRows(Database(folder))
+        self.batches = BatchRows(Database(folder))
         self._files = PictureFiles(folder / RENDERS, room)
         self._room, self._reserved = room, reserved
         self.failures = 0  # of writes, which had to do without
@@ -72,6 +77,8 @@ class RenderStore:
 
         One that this version cannot read is a failed one, which says so; its row and its files stay as they are.
         """
+        for left in self._folder.glob(f"{MAKING}*"):  # by a crash
+            shutil.rmtree(left, ignore_errors=True)
         stored = self._rows.all()
         for each in stored:
             if each.unfit is not None and not each.gone:
@@ -155,8 +162,35 @@ class RenderStore:
     async def update(self, number: int, outcome: Outcome) -> None:
         await recording(partial(self._rows.update, number, outcome))
 
+    async def insert_member(self, order: Order, outcome: Outcome, batch: int, step: int) -> int:
+        """The number of a render of a batch that waits from now on, and is on the disk."""
+        return await recording(partial(self._rows.insert_member, order, outcome, batch, step))
+
+    def members(self) -> dict[str, tuple[int, int]]:
+        """By the ids of renders of batches: the batch's number, and the step. Not for an event loop."""
+        return self._rows.members()
+
+    async def insert_batch(
+        self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
+    ) -> int:
+        """The number of a batch that is on the disk from now on; see BatchRows."""
+
+        def insert() -> int:
+            with self._room(expected([order.bytes])):
+                return self.batches.insert(order, body, uses, key)
+
+        return await recording(insert)
+
+    async def forget_batch(self, number: int, ids: Collection[str]) -> None:
+        """Delete a batch, its renders, which have these ids, and their pictures."""
+        await recording(partial(self.batches.forget, number))
+        for id in ids:
+            await self._on_disk(partial(self._files.delete, id), _pool(self._files.size(id)))
+
     async def document(self, number: int) -> bytes:
-        """The folded document, patched where the render has a patch."""
+        """The folded document, patched where the render has a patch, or is one of a batch."""
+        if (of_batch := await recording(partial(self._rows.step, number))) is not None:
+            return await packing(partial(document_of_step, *of_batch))
         document, patch = await recording(partial(self._rows.document, number))
         return document if patch is None else await packing(partial(patched, document, patch))
 

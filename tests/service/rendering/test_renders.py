@@ -13,12 +13,15 @@ import pytest
 
 from service.problems import Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
 from service.renders.followers import Changes
-from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.queue import RenderQueue
+from service.renders.retention import QueueLimits
 from tests.queues import LIMITS
 
 
 class Job:
     """As much of a job as its keeper looks at; it runs until told to end."""
+
+    batch = None
 
     def __init__(self, id: str, owner: str = "", size: int = 1, priority: int = 0, label: str | None = None) -> None:
         self.id, self.owner, self.size, self.ended_at = id, owner, size, 0.0

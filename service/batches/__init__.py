@@ -1,0 +1,6 @@
+"""Batches: one scene whose renders differ along axes.
+
+batch     one batch: its renders, as far as there are any, and how far they are
+members   makes its renders one after the other: what the axes leave unchanged is validated and packed once
+queue     all batches: each has a few renders in line at a time
+"""

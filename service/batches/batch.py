@@ -1,0 +1,129 @@
+"""One batch: its renders, as far as there are any, and how far they are."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from typing import Any
+
+from service.problems import Conflict, NotFound
+from service.quality import resolve
+from service.renders.job import Job
+from service.renders.status import iso, status
+from service.renders.store.batch_rows import BatchOrder
+from service.renders.store.record import ENDED, Order, Outcome, State
+from service.scene.settings import Settings
+
+STATES: tuple[State, ...] = ("queued", "running", *ENDED)
+ID_DIGITS, STEP_DIGITS = 24, 8  # of a render's id: those of its batch, and its place
+
+
+def member_id(batch: str, step: int) -> str:
+    """The id of render `step`, which is known before there is one."""
+    return f"{batch[:ID_DIGITS]}{step:0{STEP_DIGITS}x}"
+
+
+class Batch:
+    """For the event loop. Renders are made a few at a time; of the others only their number counts."""
+
+    number = 0  # rises in the order of arrival
+    cancelled = False
+    gone = False  # it was deleted, or made room for others
+
+    def __init__(self, order: BatchOrder) -> None:
+        self.order = order
+        self.id, self.owner = order.id, order.owner
+        self.client = order.owner or order.id  # whose share of the disk its document counts towards
+        self.bytes = order.bytes
+        self.jobs: dict[int, Job] = {}  # by step: those that there are
+        self.finished = asyncio.Event()
+        self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; whoever waits clears it
+        self.ended_at = 0.0  # by the monotonic clock
+        self.making = asyncio.Lock()  # while one of its files is made ...
+        self.files: dict[Any, Any] = {}  # ... of which the last ones stay, by what they show
+        self._busy_s = 0.0  # seconds that ended renders took, setup included
+        self._ended = set[int]()
+
+    def add(self, step: int, job: Job) -> None:
+        """A render is there; it may have ended before the server started."""
+        self.jobs[step] = job
+        job.batch = self
+        if job.finished.is_set():
+            self.ended(job)
+
+    def ended(self, job: Job) -> None:
+        """One of its renders has ended."""
+        step = int(job.id[ID_DIGITS:], 16)
+        if step in self._ended:
+            return
+        self._ended.add(step)
+        self._busy_s += job.outcome.setup_s + job.elapsed_s
+        self._look()
+
+    def cancel(self) -> None:
+        """No further renders are made."""
+        self.cancelled = True
+        self._look()
+
+    def _look(self) -> None:
+        self.changed.set()
+        done = len(self._ended) == (len(self.jobs) if self.cancelled else self.order.renders)
+        if done and not self.finished.is_set():
+            self.ended_at = max((job.ended_at for job in self.jobs.values()), default=time.monotonic())
+            self.finished.set()
+
+    @property
+    def ahead(self) -> int:
+        """Renders that wait or run."""
+        return len(self.jobs) - len(self._ended)
+
+    @property
+    def size(self) -> int:
+        """The bytes that it takes on the disk."""
+        return self.order.bytes + sum(job.size for job in self.jobs.values())
+
+    @property
+    def state(self) -> State:
+        if not self.finished.is_set():
+            return "running" if any(job.outcome.started_at for job in self.jobs.values()) else "queued"
+        if self.cancelled:
+            return "cancelled"
+        return "failed" if all(job.state == "failed" for job in self.jobs.values()) else "done"
+
+    def state_of(self, step: int) -> State:
+        job = self.jobs.get(step)
+        return job.state if job is not None else "cancelled" if self.cancelled else "queued"
+
+    def status(self) -> dict[str, Any]:
+        """As JSON."""
+        states = [self.state_of(step) for step in range(self.order.renders)]
+        counts = Counter(states)
+        ended = sum(counts[state] for state in ENDED)
+        under_way, measured = not self.finished.is_set(), counts["done"] + counts["failed"]
+        return {
+            "id": self.id,
+            "state": self.state,
+            "label": self.order.label,
+            "priority": self.order.priority,
+            "created": iso(self.order.created_at),
+            "counts": {state: counts[state] for state in STATES},
+            "renders": [{"id": member_id(self.id, step), "state": state} for step, state in enumerate(states)],
+            "eta_s": (self.order.renders - ended) * self._busy_s / measured if measured and under_way else None,
+        }
+
+    def waiting_status(self, step: int) -> dict[str, Any]:
+        """The status of a render that is not there yet. Its settings are known at its turn."""
+        order = Order(
+            member_id(self.id, step), self.owner, resolve(Settings()), self.order.label, self.order.priority,
+            self.order.created_at,
+        )  # fmt: skip
+        return status(order, Outcome(state=self.state_of(step)), 0)
+
+    def job(self, step: int) -> Job:
+        """A render that there is. Raises NotFound, Conflict."""
+        if not 0 <= step < self.order.renders:
+            raise NotFound("There is no render of this id.")
+        if step not in self.jobs:
+            raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
+        return self.jobs[step]

@@ -1,0 +1,167 @@
+"""All batches: each has a few renders in line at a time, so that a million of them take no more than those."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable, Collection
+from functools import partial
+
+from service.batches.batch import ID_DIGITS, STEP_DIGITS, Batch, member_id
+from service.batches.members import Members
+from service.problems import Gone, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.renders.queue import RETRY_S, RenderQueue
+from service.renders.store.batch_rows import BatchOrder, StoredBatch
+from service.renders.store.record import IdempotencyKey
+from service.system.executors import parsing, recording
+
+EACH = 32  # batches of one owner that are under way
+AGAIN_S = 5.0  # between two attempts to queue a render where there is no room
+
+log = logging.getLogger(__name__)
+
+
+class BatchQueue:
+    """For the event loop. An owner learns of no other's batches."""
+
+    def __init__(self, renders: RenderQueue, members: Callable[[Batch, bytes], Members], ahead: int) -> None:
+        """`ahead`: renders of a batch that wait or run at a time."""
+        self._renders, self._members, self._ahead = renders, members, ahead
+        self._batches: dict[str, Batch] = {}  # in the order of arrival
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def submit(
+        self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
+    ) -> Batch:
+        """Store a batch and begin it. Raises what packing its first scene raises; TooManyRequests, Unavailable."""
+        self.admit(order.owner)
+        batch = Batch(order)
+        members = self._members(batch, body)
+        await members.check()
+        batch.number = await self._renders.store_batch(batch, order, body, uses, key)
+        self._batches = {id: each for id, each in self._batches.items() if not each.gone} | {batch.id: batch}
+        self._begin(batch, members)
+        return batch
+
+    def admit(self, owner: str) -> None:
+        """Raise what `submit` would raise, before a scene is read for nothing."""
+        self._renders.admit(owner)
+        under_way = sum(each.owner == owner and not each.finished.is_set() for each in self._batches.values())
+        if under_way >= EACH:
+            raise TooManyRequests(f"{under_way} batches of yours are under way: no more than {EACH} may be", RETRY_S)
+
+    def resume(self, stored: Collection[StoredBatch]) -> list[Batch]:
+        """The batches that the store has, which go on with `go_on` once they have their renders."""
+        for each in stored:
+            batch = Batch(each.order)
+            batch.number = each.number
+            self._batches[batch.id] = batch
+            if each.cancelled:
+                batch.cancel()
+        return list(self._batches.values())
+
+    def go_on(self) -> None:
+        for batch in self._batches.values():
+            if batch.finished.is_set():
+                self._renders.keep(batch)
+            elif not batch.cancelled:
+                self._begin(batch, None)
+
+    def get(self, id: str, owner: str = "") -> Batch:
+        """Raises NotFound."""
+        batch = self._batches.get(id)
+        if batch is None or batch.owner != owner:
+            raise NotFound("There is no batch of this id.")
+        if batch.gone:
+            raise Gone("This batch was deleted, or it ended long ago and made room for newer renders.")
+        return batch
+
+    def waiting(self, id: str, owner: str = "") -> tuple[Batch, int] | None:
+        """The batch of a render that is not there yet, and its place in it."""
+        if len(id) != ID_DIGITS + STEP_DIGITS:
+            return None
+        for batch in self._batches.values():  # few, and all ids but those of their renders end here
+            if batch.owner == owner and not batch.gone and id.startswith(batch.id[:ID_DIGITS]):
+                try:
+                    step = int(id[ID_DIGITS:], 16)
+                except ValueError:
+                    return None
+                if step < batch.order.renders and step not in batch.jobs and member_id(batch.id, step) == id:
+                    return batch, step
+        return None
+
+    async def cancel(self, batch: Batch) -> None:
+        """Cancel what waits or runs; the pictures so far stay."""
+        batch.cancel()
+        if (store := self._renders.store) is not None:
+            await recording(partial(store.batches.cancel, batch.number))
+        for job in list(batch.jobs.values()):
+            if not job.finished.is_set():
+                self._renders.cancel(job)
+        batch.cancel()  # which has ended now
+
+    async def delete(self, batch: Batch) -> None:
+        """Forget one that has ended, with its pictures."""
+        await self._renders.delete_batch(batch)
+
+    async def keyed(self, owner: str, key: str) -> tuple[str, str] | None:
+        """The digest and the id of the batch of an idempotency key."""
+        store = self._renders.store
+        return None if store is None else await recording(partial(store.batches.keyed, owner, key))
+
+    async def close(self) -> None:
+        """The server ends: renders that are not in line yet are made after the next start."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _begin(self, batch: Batch, members: Members | None) -> None:
+        task = asyncio.get_running_loop().create_task(self._feed(batch, members))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _feed(self, batch: Batch, members: Members | None) -> None:
+        """Put its renders in line, in their order, until all of them were, and wait for the last one's end."""
+        try:
+            await self._put_in_line(batch, members)
+            while not batch.finished.is_set():
+                await self._changed(batch)
+            self._renders.keep(batch)
+        except ServiceError as error:
+            log.error("a batch cannot go on", {"id": batch.id[:6], "error": error})
+        except Exception:
+            log.exception("a batch cannot go on")
+
+    async def _put_in_line(self, batch: Batch, members: Members | None) -> None:
+        missing = [step for step in range(batch.order.renders) if step not in batch.jobs]
+        if not missing:
+            return
+        members = members or await self._read(batch)
+        for step in missing:
+            while batch.ahead >= self._ahead and not batch.cancelled:
+                await self._changed(batch)
+            if batch.cancelled:
+                return
+            job = await members.job(step, stored=self._renders.store is not None)
+            while not batch.cancelled:
+                try:
+                    await self._renders.submit_member(job, batch, step)
+                    break
+                except (TooManyRequests, Unavailable) as error:
+                    job.wait(error)
+                    await self._changed(batch, AGAIN_S)
+
+    async def _read(self, batch: Batch) -> Members:
+        """Of a batch that an earlier server began. Raises NotFound."""
+        assert self._renders.store is not None
+        body = await recording(partial(self._renders.store.batches.body, batch.number))
+        if body is None:
+            raise NotFound("The document of this batch is not stored any more.")
+        return await parsing(partial(self._members, batch, body), batch.client)
+
+    @staticmethod
+    async def _changed(batch: Batch, seconds: float | None = None) -> None:
+        batch.changed.clear()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(batch.changed.wait(), seconds)

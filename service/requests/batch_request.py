@@ -1,0 +1,124 @@
+"""The body of `POST /v1/batches`: a scene, its settings, and the axes along which they vary."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter
+
+from service.config import Config
+from service.problems import FieldError, InvalidDocument
+from service.requests.request_parser import RenderRequest, RequestParser, digest_of, folded, unfolded
+from service.scene import load_json, references
+from service.scene.axes import Axis, Variations
+from service.scene.document import Parsed
+from service.scene.validation import validated
+
+MOST_AXES = 16
+
+
+class _BatchRequest(RenderRequest):
+    over: Annotated[list[Axis], Field(min_length=1, max_length=MOST_AXES)]
+
+
+_BATCH_REQUEST = TypeAdapter(_BatchRequest)
+_AXES: TypeAdapter[list[Any]] = TypeAdapter(list[Axis])
+
+
+@dataclass(frozen=True)
+class ParsedBatch:
+    """A batch whose every step is valid, the other axes being at their first. `body` is the folded `{scene,
+    settings}` that varies."""
+
+    body: bytes
+    axes: str  # JSON
+    renders: int
+    assets: list[str]  # that its scenes refer to
+    label: str | None
+    priority: int
+    digest: str  # of the body as parsed JSON
+
+
+def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
+    """Takes time in proportion to the sum of the axes' lengths. Raises InvalidDocument with pointers from the root of
+    the body, MalformedJson."""
+    document = load_json(body)
+    request = validated(_BATCH_REQUEST, document, "")
+    base = {"scene": request.scene, "settings": request.settings}
+    variations = Variations(base, request.over)
+    if len(variations) > config.max_batch:
+        detail = f"makes {len(variations)} renders: no more than {config.max_batch} are allowed (SUNBOX_MAX_BATCH)"
+        raise InvalidDocument([FieldError("/over", detail)])
+    assets = dict.fromkeys(_checked(RequestParser(config), variations))
+    axes = _AXES.dump_json(request.over, exclude_unset=True).decode()
+    return ParsedBatch(
+        folded(base), axes, len(variations), list(assets), request.label, request.priority, digest_of(document)
+    )
+
+
+def variations(base: Any, axes: str) -> Variations:
+    """Of what is stored of a batch."""
+    return Variations(base, _AXES.validate_json(axes))
+
+
+def variations_of(axes: str) -> Variations:
+    """The axes alone, for their names."""
+    return variations({}, axes)
+
+
+def document_of_step(body: bytes, axes: str, step: int) -> bytes:
+    """The folded scene of a batch at a step. Raises InvalidDocument."""
+    return folded(variations(json.loads(unfolded(body)), axes).document(step)["scene"])
+
+
+def _checked(parser: RequestParser, variations: Variations) -> Iterator[str]:
+    """The assets of every step; of each scene only what differs from the first one's is validated."""
+    first = _first(variations)
+    try:
+        scene, _ = parser.both(first["scene"], first["settings"])
+    except InvalidDocument as error:
+        raise _of_first_steps(parser, variations, error) from None
+    known = Parsed(first["scene"], scene)
+    for pointer, document in _steps(variations):
+        try:
+            parser.scene(document["scene"], known)
+            if document["settings"] is not first["settings"]:
+                parser.settings(document["settings"])
+        except InvalidDocument as error:
+            raise _at(pointer, error) from None
+        yield from references.references(document["scene"])
+
+
+def _first(variations: Variations) -> Any:
+    try:
+        return variations.document(0)
+    except InvalidDocument as error:
+        raise error.under("/over") from None
+
+
+def _steps(variations: Variations) -> Iterator[tuple[str, Any]]:
+    try:
+        yield from variations.one_by_one()
+    except InvalidDocument as error:
+        raise error.under("/over") from None
+
+
+def _of_first_steps(parser: RequestParser, variations: Variations, error: InvalidDocument) -> InvalidDocument:
+    """The error of the axis whose first step made a valid document invalid; or that of the base."""
+    for i in reversed(range(len(variations.axes))):
+        before = _first(Variations(variations.base, variations.axes[:i]))
+        try:
+            parser.both(before["scene"], before["settings"])
+        except InvalidDocument as earlier:
+            error_of_base = earlier
+        else:
+            return _at(f"/{i}{variations.axes[i].pointer(0)}", error)
+    return error_of_base
+
+
+def _at(pointer: str, error: InvalidDocument) -> InvalidDocument:
+    """The mistakes of a document, seen from the step that made them."""
+    return InvalidDocument([FieldError(f"/over{pointer}", f"{each.pointer}: {each.detail}") for each in error.errors])

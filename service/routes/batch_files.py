@@ -1,0 +1,238 @@
+"""The pictures of a batch in one file: zipped, on a contact sheet, or one after the other."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import re
+import tempfile
+import time
+import zipfile
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO, Literal, get_args
+
+import numpy as np
+from PIL import Image
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+
+from service import images
+from service.batches.batch import Batch
+from service.http.downloads import FileAnswer, Written
+from service.images import animation, over_black
+from service.images.animation import MIME, AnimationFormat
+from service.images.contact_sheet import ContactSheet
+from service.ipc.messages import View
+from service.problems import NotProvided, ServiceError, TooLarge
+from service.renders.job import Job
+from service.renders.store.store import MAKING
+from service.requests.batch_request import variations_of
+from service.routes.renders import ImageQuery, picture_file
+from service.state import app_state, caller_of
+from service.system.executors import writing
+
+SheetFormat = Literal["png", "jpeg", "webp"]
+SHEET_FORMATS: tuple[SheetFormat, ...] = get_args(SheetFormat)
+DISPLAY = View("color", 0.0, "pbr_neutral", "u1")
+FRAMES = 64  # times SUNBOX_MAX_PIXELS: pixels of an animation
+MOST_KEPT = 4  # files of one batch that are not made again when they are asked for again
+LONGEST_NAME = 80  # characters in the name of a zipped file
+
+
+def zipped(request: Request, batch: Batch, query: ImageQuery, steps: Sequence[int]) -> Response:
+    """A zip that is made while it is sent: no more than one picture is in memory. A picture that cannot be made any
+    more is left out."""
+    disposition = f'attachment; filename="{batch.id[:8]}.zip"'
+    headers = {"cache-control": "no-store", "content-disposition": disposition}
+    return StreamingResponse(_zip(request, batch, query, steps), media_type="application/zip", headers=headers)
+
+
+async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequence[int]) -> AsyncIterator[bytes]:
+    sent = _Unseekable()
+    with zipfile.ZipFile(sent, "w", zipfile.ZIP_STORED) as archive:  # pictures are compressed already
+        for step in steps:
+            job = batch.jobs[step]
+            try:
+                written = await picture_file(request, job, query)
+            except ServiceError:
+                continue
+            assert written is not None  # as nobody says that the client has gone
+            data = await asyncio.to_thread(_whole, written)
+            archive.writestr(zipfile.ZipInfo(f"{_file_name(batch, step, job)}.{query.format}", _date(job)), data)
+            yield sent.taken()
+    yield sent.taken()
+
+
+def _whole(written: Written) -> bytes:
+    written.file.seek(0)
+    return written.file.read()
+
+
+def _file_name(batch: Batch, step: int, job: Job) -> str:
+    digits = max(4, len(str(batch.order.renders - 1)))
+    name = re.sub(r"[^A-Za-z0-9.]+", "-", job.order.label or "").strip("-.")[:LONGEST_NAME]
+    return f"{step:0{digits}}-{name}" if name else f"{step:0{digits}}"
+
+
+def _date(job: Job) -> tuple[int, int, int, int, int, int]:
+    """When it ended, by the clock of zip files, which begins in 1980."""
+    year, month, day, hour, minute, second, *_ = time.gmtime(job.outcome.ended_at or 0)
+    return (year, month, day, hour, minute, second) if year >= 1980 else (1980, 1, 1, 0, 0, 0)
+
+
+class _Unseekable(io.RawIOBase):
+    """Collects what is written until it is taken."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: bytes) -> int:  # type: ignore[override]
+        self._pieces.append(bytes(data))
+        return len(data)
+
+    def taken(self) -> bytes:
+        pieces, self._pieces = self._pieces, []
+        return b"".join(pieces)
+
+
+async def sheet(request: Request, batch: Batch, format: SheetFormat, width: int | None, steps: list[int]) -> Response:
+    """A contact sheet; its cells say of the renders that have no picture how far they are."""
+    cell = _scaled(batch, steps, width)
+    layout = _layout(batch, cell)
+    pixels, most = layout.size[0] * layout.size[1], app_state(request).config.max_pixels
+    if pixels > most:
+        detail = (
+            f"The sheet would have {pixels} pixels: no more than {most} are allowed (SUNBOX_MAX_PIXELS); ask for "
+        )
+        raise TooLarge(detail + "a smaller width.")
+
+    async def fill(folder: Path) -> Callable[[BinaryIO], None]:
+        pictures = _Spooled(folder / "pictures", cell)
+        await pictures.fill(batch, steps)
+        places = {step: i for i, step in enumerate(steps)}
+
+        def write(file: BinaryIO) -> None:
+            def picture(k: int) -> Image.Image | None:
+                return pictures.at(places[k]) if k in places else None
+
+            drawn = layout.drawn(picture, batch.state_of)
+            images.write(file, np.asarray(drawn), format)
+
+        return write
+
+    return await _made(request, batch, ("sheet", format, width), steps, images.FORMATS[format].mime, 3 * pixels, fill)
+
+
+async def animated(
+    request: Request, batch: Batch, format: AnimationFormat, fps: float, width: int | None, steps: list[int]
+) -> Response:
+    cell = _scaled(batch, steps, width)
+    pixels, most = cell[0] * cell[1] * batch.order.renders, FRAMES * app_state(request).config.max_pixels
+    if pixels > most:
+        detail = (
+            f"The animation would have {pixels} pixels: no more than {FRAMES} times SUNBOX_MAX_PIXELS are allowed"
+        )
+        raise TooLarge(f"{detail}, which is {most}; ask for a smaller width.")
+    if format == "mp4":
+        try:
+            animation.encoder()
+        except animation.NoEncoder as error:
+            raise NotProvided(str(error)) from None
+
+    async def fill(folder: Path) -> Callable[[BinaryIO], None]:
+        pictures = _Spooled(folder / "pictures", cell)
+        await pictures.fill(batch, steps)
+
+        def write(file: BinaryIO) -> None:
+            made = folder / "animation"
+            animation.write(made, pictures, format, fps)
+            with made.open("rb") as source:
+                while piece := source.read(1 << 20):
+                    file.write(piece)
+
+        return write
+
+    return await _made(request, batch, ("animation", format, fps, width), steps, MIME[format], 3 * pixels, fill)
+
+
+async def _made(
+    request: Request, batch: Batch, what: tuple[object, ...], steps: list[int], mime: str, most_bytes: int,
+    fill: Callable[[Path], Awaitable[Callable[[BinaryIO], None]]],
+) -> Response:  # fmt: skip
+    """The answer, from a file that is made once for all who ask while no other render of the batch ends."""
+    state, caller, key = app_state(request), caller_of(request), (*what, tuple(steps))
+    async with batch.making:
+        written: Written | None = batch.files.get(key)
+        if written is None:
+            state.downloads.admit(caller, most_bytes)
+            with tempfile.TemporaryDirectory(prefix=MAKING, dir=_folder(state.config.data_dir)) as folder:
+                write = await fill(Path(folder))
+                written = await writing(partial(state.downloads.write, write))
+            state.downloads.keep(caller, None, written)
+            batch.files[key] = written
+            while len(batch.files) > MOST_KEPT:
+                del batch.files[next(iter(batch.files))]
+    return FileAnswer(written.file, mime, {"cache-control": "no-store"}, held=written)
+
+
+def _folder(data: Path) -> Path | None:
+    """Where pictures are put one after the other: beside the data, where that can be written to."""
+    try:
+        with tempfile.TemporaryFile(dir=data):
+            return data
+    except OSError:
+        return None
+
+
+class _Spooled:
+    """Pictures of one size on the disk, which may be gone through more than once."""
+
+    def __init__(self, path: Path, size: tuple[int, int]) -> None:
+        self._path, self._size, self._count = path, size, 0
+
+    async def fill(self, batch: Batch, steps: Sequence[int]) -> None:
+        for step in steps:
+            pixels, _ = await batch.jobs[step].image(DISPLAY)
+            await writing(partial(self._append, pixels))
+
+    def _append(self, pixels: np.ndarray) -> None:
+        picture = Image.fromarray(over_black(pixels))
+        if picture.size != self._size:
+            picture = picture.resize(self._size, Image.Resampling.LANCZOS)
+        with self._path.open("ab") as file:
+            file.write(picture.tobytes())
+        self._count += 1
+
+    def at(self, index: int) -> Image.Image:
+        size = 3 * self._size[0] * self._size[1]
+        with self._path.open("rb") as file:
+            file.seek(index * size)
+            return Image.frombytes("RGB", self._size, file.read(size))
+
+    def __iter__(self) -> Iterator[Image.Image]:
+        return map(self.at, range(self._count))
+
+
+def _scaled(batch: Batch, steps: Sequence[int], width: int | None) -> tuple[int, int]:
+    """Width and height of one picture: those of the first that is done, scaled down to a width."""
+    settings = batch.jobs[steps[0]].order.settings
+    if width is None or width >= settings.width:
+        return settings.width, settings.height
+    return width, max(1, round(settings.height * width / settings.width))
+
+
+def _layout(batch: Batch, cell: tuple[int, int]) -> ContactSheet:
+    """One axis is a list, two are rows and columns; of more the last is the columns, the others are the rows."""
+    axes = variations_of(batch.order.axes)
+    *before, last = axes.axes
+    heading = [axis.title for axis in axes.axes if axis.title]
+    columns = [last.label(step) for step in range(len(last))]
+    if not before:
+        return ContactSheet(cell, columns, heading=heading)
+    rows = [", ".join(axes.labels(row * len(last))[:-1]) for row in range(len(axes) // len(last))]
+    return ContactSheet(cell, columns, rows, heading)

@@ -1,0 +1,183 @@
+"""Batches: one scene whose renders differ along axes; started, watched, and their pictures read together."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from service import images
+from service.batches.batch import Batch
+from service.config import MIB
+from service.images import animation
+from service.images.animation import AnimationFormat
+from service.problems import Conflict, FieldError, InvalidDocument, TooLarge
+from service.renders.store.batch_rows import BatchOrder
+from service.renders.store.record import IdempotencyKey
+from service.requests.batch_request import ParsedBatch
+from service.routes import answers, batch_files, waiting
+from service.routes.errors import GONE
+from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
+from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
+from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
+
+router = APIRouter(prefix="/v1", tags=["batches"])
+
+# Of a request, which stays in memory while its renders are made; larger geometry is uploaded as an asset.
+MOST_BYTES = 2 * MIB
+BatchId = Annotated[str, Path(description="As the answer to the batch's start has it.")]
+Width = Annotated[int | None, Field(ge=1, description="Pixels of one picture, which is scaled down, never up.")]
+
+
+class SheetQuery(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    format: batch_files.SheetFormat = "png"
+    width: Width = None
+
+
+class AnimationQuery(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    format: AnimationFormat = "apng"
+    fps: Annotated[float, Field(gt=0, le=120, description="Pictures a second.")] = 24.0
+    width: Width = None
+
+
+@router.post(
+    "/batches",
+    status_code=202,
+    summary="Start renders that differ along axes",
+    description="Axes multiply, and the last runs fastest. Each step of each axis is validated before this answers, "
+    "the other axes being at their first; no scene is packed before its turn. Render k is, to the bit, the render of "
+    "its document alone. `Idempotency-Key` as for renders.",
+    openapi_extra=answers.BATCH_BODY,
+    response_class=Response,
+    responses=answers.shaped(answers.StartedBatch, "Its renders wait for their turns; `Location` leads to it.", 202)
+    | answers.problems(400, 409, 413, 415, 422, 429, 503),
+)
+async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> Response:
+    state, owner = app_state(request), owner_of(request)
+    if idempotency_key is not None and not 1 <= len(idempotency_key) <= LONGEST_KEY:
+        raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
+    parsed = await _parsed(request)
+    batch = await _known(state, owner, idempotency_key, parsed)
+    if batch is None:
+        key = None if idempotency_key is None else IdempotencyKey(idempotency_key, parsed.digest)
+        batch = await _started(state, owner, parsed, key)
+    document = {"id": batch.id, "renders": batch.order.renders}
+    return JSONResponse(document, 202, {"location": f"batches/{batch.id}"})
+
+
+async def _parsed(request: Request) -> ParsedBatch:
+    state = app_state(request)
+    async with state.bodies.taken(request) as body:
+        if len(body) > MOST_BYTES:
+            detail = f"The body of a batch holds at most {MOST_BYTES // MIB} MiB: upload geometry as assets."
+            raise TooLarge(detail)
+        state.batches.admit(owner_of(request))
+        await state.renderers.able(STARTING_S)
+        parsed: ParsedBatch = await state.bodies.parsed("batch", body, caller_of(request))
+    return parsed
+
+
+async def _known(state: AppState, owner: str, key: str | None, parsed: ParsedBatch) -> Batch | None:
+    """The batch that an equal request made earlier."""
+    known = None if key is None else await state.batches.keyed(owner, key)
+    if known is None:
+        return None
+    digest, id = known
+    if digest != parsed.digest:
+        raise Conflict("This Idempotency-Key was used for another request.")
+    return state.batches.get(id, owner)
+
+
+async def _started(state: AppState, owner: str, parsed: ParsedBatch, key: IdempotencyKey | None) -> Batch:
+    order = BatchOrder(
+        secrets.token_hex(ID_BYTES), owner, parsed.renders, parsed.axes, parsed.label, parsed.priority, time.time(),
+        len(parsed.body) + len(parsed.axes),
+    )  # fmt: skip
+    async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
+        return await state.batches.submit(order, parsed.body, parsed.assets, key)
+
+
+@router.get(
+    "/batches/{id}",
+    summary="How far its renders are",
+    description="With `wait`, answers at the batch's end, or after that many seconds.",
+    response_class=Response,
+    responses=answers.shaped(answers.Batch) | answers.problems(404, 410, 422, 429),
+)
+async def status(request: Request, id: BatchId, wait: Wait = 0) -> Response:
+    batch = app_state(request).batches.get(id, owner_of(request))
+    with waiting.place(request) if wait else contextlib.nullcontext():
+        if wait and not await waiting.until(request, batch.finished.wait(), wait):
+            return Response(status_code=GONE)
+    return JSONResponse(batch.status())
+
+
+@router.delete(
+    "/batches/{id}",
+    status_code=204,
+    summary="Cancel; delete what has ended",
+    description="The renders of a batch that wait or run are cancelled, and their pictures so far stay. A batch that "
+    "has ended is deleted with all its renders, and answered 410 from then on.",
+    responses=answers.problems(404, 410, 503),
+)
+async def delete(request: Request, id: BatchId) -> None:
+    batches = app_state(request).batches
+    batch = batches.get(id, owner_of(request))
+    if batch.finished.is_set():
+        await batches.delete(batch)
+    else:
+        await batches.cancel(batch)
+
+
+@router.get(
+    "/batches/{id}/images.zip",
+    summary="The pictures of all renders that are done, zipped",
+    description="`0000-name.png` and so on, in the renders' order; each as its `image` would be.",
+    response_class=Response,
+    responses=answers.files("application/zip") | answers.problems(404, 409, 410, 422, 429, 503),
+)
+async def images_zip(request: Request, id: BatchId, query: Annotated[ImageQuery, Query()]) -> Response:
+    query.view()
+    batch = app_state(request).batches.get(id, owner_of(request))
+    return batch_files.zipped(request, batch, query, _pictured(batch))
+
+
+@router.get(
+    "/batches/{id}/sheet",
+    summary="A contact sheet of the pictures that there are",
+    description="Two axes are its rows and columns; of more, the last is its columns.",
+    response_class=Response,
+    responses=answers.files(*(images.FORMATS[name].mime for name in batch_files.SHEET_FORMATS))
+    | answers.problems(404, 409, 410, 413, 422, 429, 503),
+)
+async def sheet(request: Request, id: BatchId, query: Annotated[SheetQuery, Query()]) -> Response:
+    batch = app_state(request).batches.get(id, owner_of(request))
+    return await batch_files.sheet(request, batch, query.format, query.width, _pictured(batch))
+
+
+@router.get(
+    "/batches/{id}/animation",
+    summary="The pictures that there are, one after the other",
+    description="Those that are missing are left out. MP4 needs the program ffmpeg on the server: 501 without it.",
+    response_class=Response,
+    responses=answers.files(*animation.MIME.values()) | answers.problems(404, 409, 410, 413, 422, 429, 501, 503),
+)
+async def animated(request: Request, id: BatchId, query: Annotated[AnimationQuery, Query()]) -> Response:
+    batch = app_state(request).batches.get(id, owner_of(request))
+    steps = _pictured(batch)
+    return await batch_files.animated(request, batch, query.format, query.fps, query.width, steps)
+
+
+def _pictured(batch: Batch) -> list[int]:
+    """The steps whose renders are done. Raises Conflict where none is."""
+    steps = sorted(step for step, job in batch.jobs.items() if job.state == "done")
+    if not steps:
+        raise Conflict("None of the batch's renders is done yet.")
+    return steps
