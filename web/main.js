@@ -123,7 +123,6 @@ const stream = new Stream({
     page.ended = generation;
     tellState();
     say("The picture is done");
-    thumbnails.work();
   },
   refused(problem, valid) {
     const places = editor.takeBack(problem, valid, (pointer, detail) =>
@@ -188,7 +187,7 @@ const comparison = new Comparison(
 
 // --- the panel ---
 
-const thumbnails = new Thumbnails(() => page.isConnected && page.isDone && !page.isPaused);
+const thumbnails = new Thumbnails(() => page.isConnected && (page.isDone || page.isPaused));
 const textureThumbnails = new TextureThumbnails(blackMaterial(schema.scene));
 const adder = new Adder({ acts: editor, controller });
 const importer = new Importer({
@@ -219,7 +218,9 @@ const frame = new Frame(find, ui);
 // --- the shelf ---
 
 const hasDocuments = Object.keys(calls).some((path) => path.startsWith("/v1/documents"));
-const saved = hasDocuments ? new SavedMaterials({ acts: editor, say, changed: () => shelf?.refresh() }) : null;
+const saved = hasDocuments
+  ? new SavedMaterials({ acts: editor, say, changed: (name) => shelf?.refresh(name) })
+  : null;
 const shelf = new Shelf(find, {
   library,
   acts: editor,
@@ -315,6 +316,7 @@ function showPrices() {
 function tellState() {
   root.setAttribute("aria-busy", String(editor.isWaiting || !stream.isNewest(page.painted)));
   status.state(page.word(preparing.isShown));
+  thumbnails.work();
 }
 
 // Tells the streams what is wanted, and the page how things stand.

@@ -36,15 +36,19 @@ def test_what_is_new_shares_no_material(editor: Editor) -> None:
 
 
 def test_a_material_is_renamed(editor: Editor) -> None:
-    page, name = editor.page, "dialog[open] input"
+    page, name = editor.page, ".naming input"
     editor.settled()
     page.click("#rename-material")
     page.fill(name, "floor")
     page.keyboard.press("Enter")
-    assert editor.text("dialog[open] .trouble") == "There is a material named floor already."
+    assert editor.text(".naming .trouble") == "There is a material named floor already."
     page.fill(name, "type")  # in patches the word means something
     page.keyboard.press("Enter")
-    editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
+    assert page.locator(".naming").count() == 0
+    assert page.evaluate("document.activeElement.dataset.value") == "type", "the keyboard goes on there"
+    page.click("#material-name", click_count=2)
+    page.fill(name, "no")
+    page.keyboard.press("Escape")
     editor.wait("the new name", lambda: editor.chosen("materials") == "type")
     before = editor.settled()
     page.click("#library [data-value=gold]")

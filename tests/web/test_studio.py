@@ -45,7 +45,7 @@ def test_materials_are_pictures_on_the_shelf(editor: Editor) -> None:
     assert names(editor, "Materials") == ["subject", "floor", "material", "material-2"]
     assert own.get_by_role("option", selected=True).get_attribute("aria-label") == "material-2"
     own.get_by_role("option", name="floor").dblclick()
-    page.fill("dialog[open] .entry", "ground")
+    page.fill(".naming .entry", "ground")
     page.keyboard.press("Enter")
     editor.wait("the name", lambda: "ground" in names(editor, "Materials"))
     assert document(editor)["shapes"][1]["material"] == "ground"

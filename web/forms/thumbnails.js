@@ -109,27 +109,30 @@ export class Thumbnails {
     this.later(image, async () => document);
   }
 
-  // Call when the picture came to rest.
+  // Call when the picture comes to rest, and when it goes on: what is being rendered then makes room and waits again.
   async work() {
+    if (this.#working && !this.isIdle()) this.#working.abort();
     if (this.#working || !this.#queue.length || !this.isIdle()) return;
     const item = this.#queue.shift();
-    this.#working = item;
+    this.#working = new AbortController();
+    const { signal } = this.#working;
     try {
-      await this.#make(item);
+      await this.#make(item, signal);
     } catch {
       // Without a picture the name has to do: a thumbnail is no reason to complain.
+      if (signal.aborted && !this.#queue.some(({ image }) => image === item.image)) this.#queue.unshift(item);
     }
     this.#working = null;
     this.work();
   }
 
-  async #make({ image, get }) {
+  async #make({ image, get }, signal) {
     const document = await get();
     const name = `thumbnail ${self.crypto.subtle ? await hash(document) : JSON.stringify(document)}`;
     let blob = await recall(name);
     if (!blob) {
       this.#scene ??= await studio();
-      blob = await renderPicture(staged(this.#scene, document), SETTINGS);
+      blob = await renderPicture(staged(this.#scene, document), SETTINGS, signal);
       remember(name, blob);
     }
     show(image, blob);

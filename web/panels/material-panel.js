@@ -1,10 +1,11 @@
 // The buttons around the list of the scene's materials, and the line that says what is made of the one in hand.
 
-import { askName, askWhich } from "../lib/ask.js";
+import { askWhich } from "../lib/ask.js";
 import { pictured } from "../document/material-set.js";
 import * as materials from "../document/materials.js";
 import { things } from "../document/things.js";
 import { watchMenu } from "../lib/menu.js";
+import { nameInPlace } from "../lib/name-entry.js";
 import { pointer } from "../lib/patch.js";
 import { watchToolbar } from "../lib/tabs.js";
 import { sentence } from "../lib/format-text.js";
@@ -25,7 +26,7 @@ export class MaterialPanel {
       "delete-material": () => this.remove(this.#name),
     };
     for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
-    find("material-name").addEventListener("dblclick", () => this.rename(this.#name));
+    find("material-name").addEventListener("dblclick", ({ target }) => this.rename(this.#name, target));
     watchToolbar(find("material-acts"));
     watchToolbar(find("material-tools"));
     watchMenu(find("material-more"), find("material-menu"));
@@ -44,15 +45,23 @@ export class MaterialPanel {
     this.#add((state) => materials.copied(state, this.acts.material));
   }
 
-  async rename(from) {
-    const to = await askName({
-      title: "Rename the material",
-      label: "Name",
+  // Where its name stands on the shelf, else in the inspector.
+  async rename(from, at = this.#tile(from) ?? this.find("material-name")) {
+    const to = await nameInPlace(at, {
+      label: `Name of ${from}`,
       value: from,
-      action: "Rename",
       problem: (name) => materials.problem(this.acts.state.scene, from, name),
     });
     if (to !== null && to !== from) this.acts.change(materials.renamed(this.acts.state, from, to));
+    this.#tile(to ?? from)
+      ?.closest("[role=option]")
+      .focus();
+  }
+
+  #tile(name) {
+    const found = this.find("materials").querySelector(`[data-value="${CSS.escape(name)}"] > span`);
+    found?.scrollIntoView({ block: "nearest", inline: "nearest" });
+    return found?.checkVisibility() ? found : null;
   }
 
   async remove(name) {

@@ -7,7 +7,7 @@ import { WHOSE } from "./scene-menu.js";
 export class SavedMaterials {
   entries = []; // {name, title}
 
-  // `acts` the editor, `changed()` is called when there are others, `say(text)` reads out.
+  // `acts` the editor, `changed(name)` is called when there are others or the one of that name is another, `say(text)` reads out.
   constructor({ acts, changed, say }) {
     Object.assign(this, { acts, changed, say });
     this.refresh();
@@ -22,10 +22,11 @@ export class SavedMaterials {
     }
   }
 
-  refresh() {
+  // `saved`: the title of one that is new or another.
+  refresh(saved = null) {
     return this.#try(async () => {
       this.entries = (await api.listSaved("materials")).map(({ name, title = name }) => ({ name, title }));
-      this.changed();
+      this.changed(this.entries.find(({ title }) => title === saved)?.name);
     });
   }
 
@@ -49,7 +50,7 @@ export class SavedMaterials {
       if (isTaken && !(await ask({ title: `Replace “${wanted}”?`, detail: WHOSE, yes: "Replace" }))) return;
       await api.save("materials", wanted, materialSet);
       this.say(`Saved ${wanted}.`);
-      await this.refresh();
+      await this.refresh(wanted);
     });
   }
 

@@ -70,7 +70,7 @@ export class Shelf {
         element(
           "button",
           { type: "button", role: "tab", "data-kind": kind, "aria-controls": "library" },
-          inWords(kind),
+          kind === SAVED ? "Mine" : inWords(kind),
         ),
       ),
     );
@@ -106,9 +106,12 @@ export class Shelf {
     );
   }
 
-  // Saved materials have come or gone.
-  refresh() {
+  // Saved materials have come or gone; the one that was saved just now gets another picture.
+  refresh(changed = null) {
     this.#list();
+    const value = `${SAVED} ${changed}`;
+    const image = this.shown.image(value);
+    if (image) this.thumbnails.later(image, () => this.#fetch(value));
   }
 
   async #fetch(value) {
