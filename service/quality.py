@@ -88,12 +88,13 @@ def price_list() -> dict[str, Any]:
 
 
 def priced() -> dict[str, Any]:
-    """The presets, each with its measured cost and what it gives up."""
+    """The presets, each with its measured cost, that of a square of `size` pixels across, and what it gives up."""
     prices = price_list()
     if not prices:
         return PRESETS
+    size = {"size": prices["told_size"]}
     return {
-        name: knobs | {"cost": prices["presets"][name], "gives_up": text(name, prices)}
+        name: knobs | {"cost": prices["presets"][name] | size, "gives_up": text(name, prices)}
         for name, knobs in PRESETS.items()
     }
 

@@ -32,6 +32,7 @@ export function makeCommands({
   importer,
   sceneMenu,
   exportMenu,
+  finals,
   complain,
   say,
   refresh,
@@ -94,7 +95,7 @@ export function makeCommands({
     resetView: () => editor.resetView(),
     showKeys: () => find("keys-dialog").showModal(),
     toggleOutline: () => find("toggle-outline").click(),
-    openRender: () => ui.set({ tab: "render" }),
+    renderPicture: () => finals.render(),
     download: () => exportMenu.png(),
   };
   return {
@@ -108,7 +109,7 @@ export function makeCommands({
 // The command of each button, by the button's id.
 const BUTTONS = {
   pause: "togglePause",
-  render: "openRender",
+  render: "renderPicture",
   compare: "toggleCompare",
   help: "showKeys",
   undo: "undo",
@@ -160,6 +161,7 @@ export function keyTable(does) {
       group: "Tools",
     },
     { keys: ["o"], ctrl: true, does: does.openFiles, says: "open a model or a scene", group: "Work" },
+    { keys: ["enter"], ctrl: true, does: does.renderPicture, says: "render the final picture", group: "Work" },
     { keys: [" "], does: does.togglePause, says: "pause, resume", group: "Work" },
     { keys: ["p"], does: does.download, says: "the picture as a PNG", group: "Work" },
     { keys: ["n"], does: does.snapshot, says: "take a snapshot", group: "Work" },

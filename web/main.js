@@ -11,11 +11,11 @@ import { Frame } from "./panels/frame.js";
 import { Importer, watchDrops } from "./importer.js";
 import { makeHeader } from "./header.js";
 import { askForKey } from "./server/key.js";
+import { FinalPictures } from "./renders/final-pictures.js";
 import { fillSheet, watchKeys } from "./keys.js";
 import { LobePanel } from "./lobe/panel.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
-import { Output, forecastSize } from "./panels/output.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
 import { pictureRecipes } from "./picture/picture-recipe.js";
@@ -85,6 +85,7 @@ const recipes = pictureRecipes({
 
 // The name of a scene in words.
 const titleOf = ({ scene: own }) => library.scenes.find(({ name: each }) => each === own)?.title ?? own;
+const sceneTitle = () => titleOf(editor.state.chosen) || "Your own scene";
 
 // --- the picture ---
 
@@ -97,7 +98,7 @@ const viewport = new Viewport(find("picture"), {
     status.frame(frame.header, page.limit);
     controller.painted(frame);
     comparison.painted();
-    if (ui.state.tab === "render") showPrices();
+    if (ui.state.tab === "render") finals.show();
     tellState();
   },
 });
@@ -265,12 +266,16 @@ const lobe = new LobePanel(find("lobe"), {
 find("show-lobe").hidden = !lobe.isPossible;
 for (const near of ["pointerenter", "focus"]) find("show-lobe").addEventListener(near, () => lobe.prepare());
 
-const output = new Output(find("output"), {
+const finals = new FinalPictures({
+  find,
   schema,
-  acts: editor,
-  order: () => ({ scene: editor.state.scene, settings: editor.state.settings }),
-  view: () => page.view,
-  head: find("render-size"),
+  page,
+  editor,
+  ui,
+  messages,
+  recipes,
+  title: sceneTitle,
+  compareWith: comparison.compareWith ? (render) => comparison.compareWith(render) : null,
   complain,
   say,
 });
@@ -286,6 +291,7 @@ const commands = makeCommands({
   importer,
   sceneMenu,
   exportMenu,
+  finals,
   complain,
   say,
   refresh,
@@ -306,12 +312,6 @@ watchDrops(document, {
 });
 
 // --- what is shown when something has changed ---
-
-function showPrices() {
-  const { settings } = editor.state;
-  panel.showQualities(page.info.quality, settings, page.header);
-  output.show(settings, page.size, (wanted) => forecastSize(wanted, page.limit, page.header));
-}
 
 function tellState() {
   root.setAttribute("aria-busy", String(editor.isWaiting || !stream.isNewest(page.painted)));
@@ -337,8 +337,8 @@ function refresh() {
   panel.show(editor.state, page.knobs);
   outliner.show(editor.state);
   shelf.show(editor.state);
-  find("scene-title").textContent = titleOf(editor.state.chosen) || "Your own scene";
-  if (page.info) showPrices();
+  find("scene-title").textContent = sceneTitle();
+  if (page.info) finals.show();
   find("undo").disabled = !editor.canUndo;
   find("redo").disabled = !editor.canRedo;
   find("paste-material").disabled = !commands.canPaste;

@@ -37,7 +37,14 @@ def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any
     for tab in ("scene", "film", "render", "view", "save", "material"):
         editor.tab(tab)
         assert findings(editor) == [], tab
-    for button in ("#export", "#material-more", "#readings-button", "#tab-environments", "#tab-scenes"):
+    for button in (
+        "#export",
+        "#material-more",
+        "#readings-button",
+        "#tab-environments",
+        "#tab-scenes",
+        "#tab-renders",
+    ):
         editor.page.click(button)
         assert findings(editor) == [], button
         editor.page.keyboard.press("Escape")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -118,24 +119,82 @@ def test_the_picture_fills_its_box_within_an_area(page: Page) -> None:
     }
 
 
-def test_a_preset_says_what_it_costs_this_scene_and_before_that_the_list(page: Page) -> None:
+def test_a_preset_costs_what_this_scene_takes_and_before_that_what_the_list_says(page: Page) -> None:
     cost = {
-        "seconds": 23.4, "noise": 0.039, "missing_light": 0.0004,
+        "seconds": 24.0, "noise": 0.039, "size": 512, "missing_light": 0.0004,
         "worst_missing_light": {"share": 0.0296, "scene": "glass"},
     }  # fmt: skip
     preset = {"max_samples": 256, "max_bounces": 8, "cost": cost}
 
-    def said(live: Any) -> list[str]:
-        told = [call(page, "forms/quality.js", name, preset, live) for name in ("price", "taken")]
-        return [text.replace("\u00a0", " ") for text in told]
+    def price(live: Any) -> Any:
+        at = {"live": live, "size": {"width": 1024, "height": 512}}
+        return call(page, "forms/quality.js", "priceOf", preset, at)
 
-    assert said(None) == [
-        "listed: 23 s to 3.9 % noise",
-        "256 samples, 8 bounces; beyond them under 0.05 %, in glass 3 %, of the listed scenes' light is missing",
-    ]
-    live = {"samples": 64, "scale": 1, "elapsed_s": 10, "noise": 0.08}
-    assert said(live | {"scale": 0.25}) == said(None), "a preview tells nothing of the picture's price"
-    assert said(live) == ["≈ 40 s to 4 % noise here", said(None)[1]]
+    listed = {"seconds": 48.0, "noise": 0.039, "isListed": True}
+    assert price(None) == listed, "twice the pixels"
+    live = {"samples": 64, "scale": 1, "elapsed_s": 10, "noise": 0.08, "width": 256, "height": 256}
+    assert price(live | {"scale": 0.25}) == listed, "a preview tells nothing of the picture's price"
+    assert price(live) == {"seconds": 320.0, "noise": 0.04, "isListed": False}
+    assert call(page, "forms/quality.js", "taken", preset).replace("\u00a0", " ") == (
+        "256 samples, 8 bounces; beyond them under 0.05 %, in glass 3 %, of the listed scenes' light is missing"
+    )
+    presets = {name: {"max_samples": 4**i} for i, name in enumerate(["a", "b", "c", "d", "e"], 2)}
+    assert call(page, "forms/quality.js", "words", presets, "c") == {"b": "Fast", "c": "Clean", "e": "Reference"}
+
+
+def test_a_size_is_found_by_its_name_and_keeps_a_shape(page: Page) -> None:
+    def sizes(name: str, *arguments: Any) -> Any:
+        return call(page, "renders/sizes.js", name, *arguments)
+
+    here = {"width": 900, "height": 700}
+    assert sizes("sizeOf", "4k", here) == {"width": 3840, "height": 2160}
+    assert sizes("sizeOf", "window", here) is None
+    assert sizes("withSide", "custom", here, "width", 64) == {"width": 64, "height": 700}
+    assert sizes("withSide", "2:3", here, "width", 64) == {"width": 64, "height": 96}
+    assert sizes("withSide", "2:3", here, "height", 96) == {"width": 64, "height": 96}
+    assert sizes("choiceOf", {"width": 1080, "height": 1920}, "custom") == "story"
+    assert sizes("choiceOf", {"width": 64, "height": 96}, "2:3") == "2:3"
+    assert sizes("choiceOf", {"width": 65, "height": 90}, "2:3") == "custom"
+    assert sizes("choiceOf", None, "hd") == "window"
+
+
+def test_a_bar_never_goes_back_and_the_time_left_does_not_jump(page: Page) -> None:
+    script = """async (statuses) => {
+        const { Advance } = await import(new URL("renders/advance.js", location));
+        const advance = new Advance();
+        return statuses.map((status, now) => {
+            const usual = { state: "running", noise: null, elapsed_s: now, settings: { max_samples: 100 } };
+            advance.take({ ...usual, ...status }, now);
+            return [advance.share, advance.left(now)];
+        });
+    }"""
+    chance = random.Random(3)
+    taken = [min(100, i) for i in range(60)]
+    statuses = [{"samples": n, "eta_s": (100 - n) * chance.uniform(0.5, 2)} for n in taken]
+    statuses[30]["samples"] = 12  # the server was restarted, and goes on from what it had stored
+    shown = page.evaluate(script, statuses)
+    shares, lefts = zip(*shown, strict=True)
+    assert list(shares) == sorted(shares) and shares[-1] == 0.59
+    estimates = [status["eta_s"] for status in statuses]
+    leaps = [abs(b - a) for a, b in pairwise(estimates)]
+    steps = [abs(b - a) for a, b in pairwise(lefts)]
+    assert max(steps) < 0.1 * max(leaps) and max(steps) < 9, "seconds, from one second to the next"
+    assert lefts[-1] == pytest.approx(1.25 * 41, rel=0.4), "and it says what the estimates say in the mean"
+    timed = {"samples": 8, "eta_s": None, "settings": {"time_limit": 4}}
+    done = {"state": "done", "samples": 9, "eta_s": 0}
+    assert page.evaluate(script, [timed, timed, done]) == [[0, None], [0.25, None], [1, None]]
+    assert page.evaluate(script, [{"samples": 0, "eta_s": None}]) == [[0, None]]
+
+
+def test_a_file_is_named_by_scene_size_and_samples(page: Page) -> None:
+    def name(title: str) -> Any:
+        return call(
+            page, "document/file-name.js", "pictureFile", title, {"width": 8, "height": 6, "samples": 1}, "png"
+        )
+
+    assert name("Sphere on a floor") == "Sphere-on-a-floor-8x6-1.png"
+    assert name("../Übung: rund/eckig ") == "Übung-rund-eckig-8x6-1.png"
+    assert name("…") == "scene-8x6-1.png"
 
 
 def test_a_matrix_is_told_as_move_turn_and_scale(page: Page) -> None:

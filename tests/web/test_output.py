@@ -1,70 +1,170 @@
-"""The picture that is taken along: its size and shape, and its render as a job of the server's."""
+"""Final pictures: their size and quality, and the renders that the server has of them."""
 
 from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from PIL import Image
+from playwright.sync_api import Locator
 
 from service.images import read_metadata
+from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.editing import finish
 
-OUTPUT = "#output"
+SIDES = ("Width", "Height")
 
 
 def write(editor: Editor, side: str, value: int) -> None:
-    entry = editor.page.locator(editor.field(side, "number", OUTPUT))
+    entry = editor.page.get_by_role("spinbutton", name=side)
     entry.fill(str(value))
     entry.press("Enter")
 
 
-def side(editor: Editor, name: str) -> int:
-    return int(editor.page.input_value(editor.field(name, "number", OUTPUT)))
+def size(editor: Editor) -> list[int]:
+    return [int(editor.page.get_by_role("spinbutton", name=side).input_value()) for side in SIDES]
 
 
-def test_a_picture_of_any_size_is_rendered_and_saved(editor: Editor) -> None:
+def renders(editor: Editor) -> Locator:
+    """Those listed, the newest first."""
+    return editor.page.get_by_role("list", name="Renders").get_by_role("listitem")
+
+
+def order(editor: Editor, samples: int, width: int = 64, height: int = 48) -> Locator:
+    """Have a picture rendered from the header: its item in the list."""
+    editor.tab("render")
+    entry = editor.page.locator("#settings-form [data-field=max_samples] input")
+    entry.fill(str(samples))
+    entry.press("Enter")
+    write(editor, "Width", width)
+    write(editor, "Height", height)
+    before = editor.page.locator("#renders-sheet .render").count()
+    editor.page.get_by_role("button", name=f"Render {width}×{height}").click()
+    editor.wait("its item", lambda: renders(editor).count() > before)
+    return renders(editor).first
+
+
+def is_done(item: Locator) -> Callable[[], bool]:
+    return lambda: item.get_attribute("data-state") == "done"
+
+
+def download(editor: Editor, item: Locator, button: str) -> tuple[str, bytes]:
+    with editor.page.expect_download() as waiting:
+        item.get_by_role("button", name=button).click()
+    return waiting.value.suggested_filename, waiting.value.path().read_bytes()
+
+
+def plain(text: str) -> str:
+    return text.replace("\u202f", " ").replace("\u00a0", " ")
+
+
+def test_a_picture_is_rendered_in_any_size_and_saved(editor: Editor) -> None:
     page = editor.page
-    finish(editor, 4)
-    screen = page.evaluate("[picture.width, picture.height]")
-    assert [side(editor, "width"), side(editor, "height")] == screen, "unless told it is the window's"
-    assert f"{screen[0]}\u202f×\u202f{screen[1]}" in editor.text(OUTPUT)
-    page.select_option(f"{OUTPUT} select", "2:3")
-    write(editor, "width", 64)
-    assert side(editor, "height") == 96, "the shape stays"
+    editor.tab("render")
+    assert size(editor) == page.evaluate("[picture.width, picture.height]"), "unless somebody says otherwise"
+    picker = page.get_by_label("Size", exact=True)
+    picker.select_option("HD, 1920 × 1080".replace(" × ", "\u202f×\u202f"))
+    assert size(editor) == [1920, 1080]
+    assert page.get_by_role("button", name="Render 1920×1080", exact=True).is_visible()
+    assert "1920 × 1080, Clean in about" in plain(str(page.get_attribute("#render", "title")))
+    picker.select_option("Shape 2 : 3")
+    write(editor, "Width", 64)
+    assert size(editor) == [64, 96], "the shape stays"
     editor.wait(
         "the shape on screen", lambda: page.evaluate("picture.width / picture.height") == pytest.approx(2 / 3, 0.02)
     )
-    page.select_option(f"{OUTPUT} select", "free")
-    write(editor, "height", 48)
-    assert (side(editor, "width"), side(editor, "height")) == (64, 48)
-    page.click(f"{OUTPUT} >> text=Render picture")
-    editor.wait("the picture", lambda: page.is_visible(f"{OUTPUT} .result img"))
-    saved = editor.shot(f"{OUTPUT} >> text=Save as PNG")
-    made = read_metadata(saved)
-    assert Image.open(io.BytesIO(saved)).size == (64, 48) and made is not None and made["samples"] == 4
-    assert "Done: 64\u202f×\u202f48, 4 samples" in editor.text(OUTPUT)
+    picker.select_option("Custom")
+    item = order(editor, 1)
+    editor.wait("the end", is_done(item))
+    assert item.get_by_role("progressbar").get_attribute("value") == "1"
+    assert item.get_attribute("aria-label") == "Sphere on a floor"
+    editor.wait("its picture", lambda: item.locator("img.painted").count() == 1)
+    assert re.search(r"Done\s*64 × 48 · 1 sample · .* s", plain(item.inner_text()))
+    name, png = download(editor, item, "Download PNG")
+    made = read_metadata(png)
+    assert Image.open(io.BytesIO(png)).size == (64, 48) and made is not None and made["samples"] == 1
+    assert name == "Sphere-on-a-floor-64x48-1.png"
+    item.get_by_role("button", name="More for this render").click()
+    with page.expect_download() as waiting:
+        page.get_by_role("menuitem", name="WebP").click()
+    assert Image.open(waiting.value.path()).format == "WEBP" and waiting.value.suggested_filename.endswith("-1.webp")
+    page.get_by_role("tab", name="Renders").click()
+    assert renders(editor).count() == page.locator("#renders-sheet .render").count(), "here now, and in one place"
+    name, exr = download(editor, renders(editor).first, "Download EXR")
+    assert name == "Sphere-on-a-floor-64x48-1.exr" and b"normal.X" in exr
 
 
-def test_a_render_can_be_refused_and_cancelled(editor: Editor) -> None:
+def test_a_render_goes_on_without_the_page_and_is_stopped_and_deleted(editor: Editor, server: Server) -> None:
     page = editor.page
+    item = order(editor, 100_000, width=96)
+    share = item.get_by_role("progressbar")
+    editor.wait("samples", lambda: "Rendering" in item.inner_text() and item.locator("img.painted").count())
+    id = item.get_attribute("data-id")
+    page.goto("about:blank")
+    editor.open(server.url)
+    page.get_by_role("tab", name="Renders").click()
+    item = page.get_by_role("list", name="Renders").locator(f"[data-id='{id}']")
+    editor.wait("the render that went on", lambda: item.count() and "Rendering" in item.inner_text())
+    shown = [float(share.get_attribute("value") or 0)]
+    before = item.inner_text()
+    editor.wait("news", lambda: item.inner_text() != before)
+    assert float(item.get_by_role("progressbar").get_attribute("value") or 0) >= shown[0]
+    item.get_by_role("button", name="Stop").press("Enter")
+    editor.wait("the end", lambda: "Stopped at" in item.inner_text())
+    focused = "document.activeElement.getAttribute('aria-label')"
+    assert page.evaluate(focused) == "Delete", "the focus does not get lost"
+    page.keyboard.press("Enter")
+    assert item.count() == 0
+    page.get_by_role("button", name="Bring back").click()
+    editor.wait("it again", lambda: item.count() == 1)
+    item.get_by_role("button", name="Delete").click()
+    editor.wait("that it is deleted", lambda: server.http.get(f"/v1/renders/{id}").status_code == 410)
+    assert item.count() == 0
+
+
+def test_a_render_that_is_refused_says_why_at_its_field(editor: Editor) -> None:
     editor.tab("render")
-    samples = page.locator("#settings-form [data-field=max_samples] input")
-    samples.fill("100000")
-    samples.press("Enter")
-    write(editor, "width", 10**8)
-    page.click(f"{OUTPUT} button.primary")
-    editor.wait("the refusal", lambda: page.locator(f"{OUTPUT} .trouble:visible").count() > 0)
+    write(editor, "Width", 10**8)
+    editor.page.keyboard.press("Control+Enter")
+    editor.wait("the refusal", lambda: editor.page.locator("#output .trouble:visible").count() > 0)
     assert editor.text("#messages") == "", "said once"
-    write(editor, "width", 90)
-    page.click(f"{OUTPUT} button.primary")
-    running = re.compile(r"\d %, \d+ samples")
-    editor.wait("samples", lambda: running.search(editor.text(OUTPUT)))
-    page.reload()
-    editor.tab("render")
-    editor.wait("the job that went on", lambda: running.search(editor.text(OUTPUT)))
-    page.click(f"{OUTPUT} >> text=Cancel")
-    editor.wait("the end", lambda: "Cancelled" in editor.text(OUTPUT))
-    assert page.is_enabled(f"{OUTPUT} button.primary")
+    assert editor.page.get_by_role("button", name="Render picture").is_enabled()
+
+
+def test_a_file_in_the_making_says_so_and_blocks_nothing(editor: Editor) -> None:
+    page = editor.page
+    item = order(editor, 2)
+    editor.wait("the end", is_done(item))
+    held: list[Any] = []
+    page.route(re.compile(r"format=exr"), lambda route: held.append(route))
+    with page.expect_download() as waiting:
+        item.get_by_role("button", name="Download EXR").click()
+        editor.wait("the words", lambda: "layers of the EXR" in item.inner_text() and "so far" in item.inner_text())
+        assert item.get_by_role("button", name="Download EXR").get_attribute("aria-busy") == "true"
+        item.get_by_role("button", name="Download EXR").click()  # which is being made
+        assert len(held) == 1
+        held[0].continue_()
+    assert waiting.value.suggested_filename.endswith(".exr")
+    editor.wait("silence", lambda: "EXR," not in item.inner_text())
+
+
+def test_a_render_is_opened_and_its_scene_again(editor: Editor) -> None:
+    page = editor.page
+    editor.pick("scenes", "point-lights")
+    editor.wait("the scene", lambda: editor.text("#scene-title") == "Two point lights")
+    item = order(editor, 2)
+    editor.wait("the end", is_done(item))
+    editor.pick("scenes", "sphere-on-floor")
+    item.get_by_role("button", name="Open").press("Enter")
+    window = page.get_by_role("dialog", name="Two point lights")
+    image = window.get_by_role("img")
+    editor.wait("its picture", lambda: image.is_visible() and image.evaluate("(image) => image.naturalWidth") == 64)
+    page.keyboard.press("Escape")
+    assert window.count() == 0 and page.evaluate("document.activeElement.getAttribute('aria-label')") == "Open"
+    item.get_by_role("button", name="Open").click()
+    window.get_by_role("button", name="Edit its scene").click()
+    editor.wait("its scene", lambda: editor.text("#scene-title") == "Two point lights")
+    assert size(editor) == [64, 48]

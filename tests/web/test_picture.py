@@ -117,20 +117,31 @@ def test_histogram_and_clipping_follow_the_exposure(editor: Editor) -> None:
 def test_quality_has_a_price(editor: Editor) -> None:
     editor.settled()
     editor.tab("render")
+    quality = editor.page.get_by_role("radiogroup", name="Quality")
 
-    def seconds(name: str) -> float:
-        words = editor.text(f".quality[data-name={name}] .price").split()
-        return float(words[1]) * {"s": 1, "min": 60, "h": 3600}[words[2]] if words else 0.0
+    def price(name: str) -> list[float]:
+        """Seconds and noise in percent."""
+        about, unit, noise = re.findall(
+            r"≈ ([\d.]+) (s|min|h)\n([\d.]+)", quality.get_by_role("radio", name=name).inner_text()
+        )[0]
+        return [float(about) * {"s": 1, "min": 60, "h": 3600}[unit], float(noise)]
 
-    editor.wait("a forecast", lambda: editor.text(".quality[data-name=reference] .price").endswith(" noise here"))
-    assert seconds("reference") > 100 * seconds("draft") > 0
-    editor.page.click(".quality[data-name=draft]")
-    editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == 16)
+    editor.wait("a forecast", lambda: "as measured on this scene" in editor.text("#output"))
+    assert quality.get_by_role("radio").all_inner_texts()[0].startswith("Fast")
+    assert price("Reference")[0] > 10 * price("Clean")[0] > 30 * price("Fast")[0] > 0
+    assert price("Reference")[1] < price("Clean")[1] < price("Fast")[1]
+    assert quality.get_by_role("radio", name="Clean").is_checked(), "what holds where nothing is chosen"
+    quality.get_by_role("radio", name="Fast").click()
+    editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == 64)
     entry = editor.page.locator("#settings-form [data-field=time_limit] input")
     entry.fill("1000")
     entry.press("Enter")
-    editor.wait("more than the preset's samples", lambda: editor.samples() > 16)
+    editor.wait("more than the preset's samples", lambda: editor.samples() > 64)
     assert "/" not in editor.text("#samples")
+    assert quality.get_by_role("radio", checked=True).count() == 0, "it is the time that ends it"
+    assert "in at most 17 min" in editor.text("#output")
+    quality.get_by_role("radio", name="Fast").click()
+    assert entry.input_value() == "", "a word brings its samples"
 
 
 def test_a_checker_stands_behind_transparency(editor: Editor) -> None:

@@ -173,7 +173,7 @@ def test_what_the_header_opens(editor: Editor) -> None:
     page.keyboard.press("Escape")
     assert page.is_hidden("#export-menu")
     assert page.locator("header .primary").count() == 1
-    page.get_by_role("button", name="Render").click()
+    page.get_by_role("tab", name="Render", exact=True).click()
     assert page.is_visible("#page-render") and page.get_by_role("button", name="Render picture").is_visible()
 
 

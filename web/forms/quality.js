@@ -1,4 +1,5 @@
-// The quality presets with what they cost this scene, here and now; before that is known, what the price list says.
+// The quality of a picture in three words, with what they cost this scene at the size that is set; before that is known,
+// what the server's price list says.
 
 import { element } from "../lib/dom.js";
 import { watchChoice } from "../lib/tabs.js";
@@ -9,20 +10,32 @@ const UNSEEN = 0.0005; // a share of the light that nobody misses
 
 const isKnown = (live) => live?.samples >= TRUSTED && live.scale === 1;
 
-// The time and noise that a number of samples comes to, from what the picture has taken so far.
-export function forecast(target, { samples, elapsed_s, noise }) {
+// The presets that the words stand for: what holds where nothing is chosen is "Clean", the next cheaper one is "Fast", and
+// the dearest one "Reference". {name: word}
+export function words(presets, standard) {
+  const names = Object.keys(presets).sort((a, b) => presets[a].max_samples - presets[b].max_samples);
+  const at = names.indexOf(standard);
+  return { [names[Math.max(0, at - 1)]]: "Fast", [standard]: "Clean", [names.at(-1)]: "Reference" };
+}
+
+export const wordOf = (name, presets, standard) => words(presets, standard)[name] ?? inWords(name);
+
+// Seconds and noise of a number of samples at a size, from what the picture on the page has taken so far; without a size
+// at the picture's own.
+export function forecast(target, { samples, elapsed_s, noise, width, height }, size = null) {
+  const more = size ? (size.width * size.height) / (width * height) : 1;
   return {
-    seconds: (elapsed_s * target) / samples,
+    seconds: (more * elapsed_s * target) / samples,
     noise: noise === null ? null : noise * Math.sqrt(samples / target),
   };
 }
 
-// What a preset costs. `live`: the header of the newest frame.
-export function price(preset, live) {
-  const { seconds, noise } = isKnown(live) ? forecast(preset.max_samples, live) : (preset.cost ?? {});
-  if (typeof seconds !== "number") return "";
-  const reached = typeof noise === "number" ? ` to ${percent(noise)} noise` : "";
-  return isKnown(live) ? `≈ ${duration(seconds)}${reached} here` : `listed: ${duration(seconds)}${reached}`;
+// What a preset, or a number of samples, takes at a size: {seconds, noise, isListed}, or null where nobody knows.
+export function priceOf({ max_samples, cost }, { live, size }) {
+  if (isKnown(live)) return { ...forecast(max_samples, live, size), isListed: false };
+  if (!cost) return null;
+  const area = (size.width * size.height) / cost.size ** 2;
+  return { seconds: area * cost.seconds, noise: cost.noise, isListed: true };
 }
 
 const share = (light) => (light < UNSEEN ? `under ${percent(UNSEEN)}` : percent(light));
@@ -37,31 +50,38 @@ export function taken({ max_samples, max_bounces, cost }) {
   return `${text}; beyond them ${listed} of the listed scenes' light is missing`;
 }
 
-export function qualityChoice(root, pick) {
+// The three words as a choice in `root`; returns what shows them.
+export function qualityWords(root, pick) {
   const mark = watchChoice(root, ".quality", (button) => pick(button.dataset.name));
-  const places = new Map();
+  const lines = new Map(); // by preset: where its time and its noise stand
   let made = null;
-  return (presets, chosen, live) => {
+  return (presets, { standard, chosen, live, size }) => {
     if (presets !== made) {
       made = presets;
-      places.clear();
+      lines.clear();
       root.replaceChildren(
-        ...Object.keys(presets).map((name) => {
-          places.set(name, { price: element("span", { class: "price" }), taken: element("span", { class: "what" }) });
+        ...Object.entries(words(presets, standard)).map(([name, word]) => {
+          lines.set(name, { time: element("span", { class: "price" }), noise: element("span", { class: "price" }) });
           return element(
             "button",
-            { type: "button", role: "radio", class: "quality", "data-name": name },
-            element("span", {}, inWords(name)),
-            ...Object.values(places.get(name)),
+            { type: "button", role: "radio", class: "quality", "data-name": name, title: taken(presets[name]) },
+            element("span", {}, word),
+            ...Object.values(lines.get(name)),
           );
         }),
       );
     }
-    for (const [name, place] of places) {
-      const texts = { price: price(presets[name], live), taken: taken(presets[name]) };
+    for (const [name, place] of lines) {
+      const { seconds, noise } = priceOf(presets[name], { live, size }) ?? {};
+      const texts = {
+        time: seconds === undefined ? amount(presets[name].max_samples, "sample") : `≈ ${duration(seconds)}`,
+        noise: typeof noise === "number" ? `${percent(noise)} noise` : "",
+      };
       for (const [part, text] of Object.entries(texts))
         if (place[part].textContent !== text) place[part].textContent = text;
     }
     mark((button) => button.dataset.name === chosen);
+    // Where none of them is chosen, the Tab key stops at the first.
+    if (!lines.has(chosen)) root.querySelector(".quality").tabIndex = 0;
   };
 }

@@ -7,19 +7,17 @@ import { MaterialPanel } from "./material-panel.js";
 import { ThingPart } from "./thing-part.js";
 import { fields, materialModels } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
-import { qualityChoice } from "../forms/quality.js";
 import { TextureSlot } from "../forms/texture-slot.js";
 import { TextureForm } from "../forms/texturing.js";
 import { inWords } from "../lib/format-text.js";
 
-// The settings that stand open; the others are a click away. The picture's size is the window's business.
+// The settings that stand open; the others are a click away. The picture's size has a form of its own.
 const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "adaptive", "denoise"];
-const NOT_SETTINGS = ["width", "height", "quality"];
+const NOT_SETTINGS = ["width", "height"];
 
 export class Panel {
   #forms = {};
   #made = null; // what the material's form was made for
-  #qualities;
 
   // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing) and takeTexture(place, file);
   // `paint(image, material)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
@@ -44,7 +42,6 @@ export class Panel {
     );
     this.thingPart = new ThingPart(find, { schema: schema.scene, acts, stage, environments: library.environments });
     this.materialPanel = new MaterialPanel(find, { acts, say, paint });
-    this.#qualities = qualityChoice(find("qualities"), (name) => acts.edit("/settings/quality", name));
     const models = Object.keys(this.materials).map((name) => ({ name, title: inWords(name) }));
     fillPicker(find("model"), models, (name) => acts.pickModel(name));
     find("filter").addEventListener("input", () => this.#forms.material.filter(find("filter").value));
@@ -103,11 +100,6 @@ export class Panel {
     }
     this.find("model").value = material.type;
     this.#forms.material.show(material);
-  }
-
-  // `live`: the header of the newest frame, from which the presets' prices for this scene follow.
-  showQualities(presets, settings, live) {
-    this.#qualities(presets, settings.quality ?? this.schema.settings.properties.quality.default, live);
   }
 
   // The forms with their places, those inside of others first.

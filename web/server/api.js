@@ -21,11 +21,12 @@ export class Problem extends Error {
 
 const authorization = () => (readKey() ? { authorization: `Bearer ${readKey()}` } : {});
 
-async function ask(method, path, { body, headers = {}, signal } = {}) {
+async function ask(method, path, { body, headers = {}, signal, keepalive } = {}) {
   const response = await fetch(new URL(path, root), {
     method,
     body,
     signal,
+    keepalive,
     headers: { accept: "application/json", ...authorization(), ...headers },
   }).catch((error) => {
     throw error.name === "AbortError" ? error : new Error("The server does not answer. Your work is safe here.");
@@ -72,14 +73,33 @@ export const askBsdf = async (question, body) => (await ask("POST", `bsdf${quest
 export const convertMaterial = async (material, to, choose) =>
   (await ask("POST", "materials/convert", json({ material, to, choose }))).json();
 
-// A render as a job of the server's: {id, ...}; how far it is, asked for until it ends or `wait` seconds passed; its
-// picture so far.
-export const submitRender = async (scene, settings) =>
-  (await ask("POST", "renders", json({ scene, settings }))).json();
-export const renderStatus = (id, wait) => get(`renders/${id}?${new URLSearchParams({ wait })}`);
-export const renderImage = async (id, query) =>
-  (await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`)).blob();
-export const cancelRender = (id) => ask("DELETE", `renders/${id}`);
+// A render as a job of the server's: {id, ...}. `key` is the page's own name for the request: sent twice it is one render.
+export const submitRender = async (order, key) =>
+  (
+    await ask("POST", "renders", { ...json(order), headers: { ...json(order).headers, "idempotency-key": key } })
+  ).json();
+// One's own renders, the newest first, and whether there are more of them.
+export async function listRenders(query) {
+  const response = await ask("GET", `renders?${new URLSearchParams(query)}`);
+  return { renders: await response.json(), hasMore: response.headers.has("link") };
+}
+export const renderStatus = (id) => get(`renders/${id}`);
+// A body that renders the same picture again: {scene, settings}.
+export const renderScene = (id) => get(`renders/${id}/scene`);
+// Its picture so far. `progress(bytes, total)` is called as it comes; `signal` ends it.
+export async function renderImage(id, query, { progress = () => {}, signal } = {}) {
+  const response = await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`, { signal });
+  const total = Number(response.headers.get("content-length")) || null;
+  const parts = [];
+  let bytes = 0;
+  for await (const part of response.body) {
+    parts.push(part);
+    progress((bytes += part.length), total);
+  }
+  return new Blob(parts, { type: response.headers.get("content-type") });
+}
+// Cancels one that has not ended; its picture so far stays. Deletes one that has.
+export const deleteRender = (id, options) => ask("DELETE", `renders/${id}`, options);
 
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
 

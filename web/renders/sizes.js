@@ -1,0 +1,42 @@
+// The sizes of a picture that have names, and shapes that keep their proportions.
+
+export const WINDOW = "window";
+export const CUSTOM = "custom";
+
+export const SIZES = {
+  hd: { title: "HD", width: 1920, height: 1080 },
+  "4k": { title: "4K", width: 3840, height: 2160 },
+  square: { title: "Square", width: 1080, height: 1080 },
+  story: { title: "Story", width: 1080, height: 1920 },
+};
+export const SHAPES = ["16:9", "3:2", "4:3", "5:4", "4:5", "2:3"];
+
+export const times = (width, height) => `${width}\u202f×\u202f${height}`;
+
+const ratioOf = (shape) => shape.split(":").reduce((a, b) => Number(a) / Number(b));
+const across = (shape, height) => Math.max(1, Math.round(height * ratioOf(shape)));
+const down = (shape, width) => Math.max(1, Math.round(width / ratioOf(shape)));
+
+// The size that a choice stands for, beside the one that is there; null is the window's.
+export function sizeOf(choice, present) {
+  if (choice === WINDOW) return null;
+  if (SIZES[choice]) return { width: SIZES[choice].width, height: SIZES[choice].height };
+  if (SHAPES.includes(choice)) return { width: present.width, height: down(choice, present.width) };
+  return present;
+}
+
+// The size once one side was written: of a shape the other side follows.
+export function withSide(choice, present, name, value) {
+  const size = { ...present, [name]: value };
+  if (!SHAPES.includes(choice)) return size;
+  return name === "width" ? { ...size, height: down(choice, value) } : { ...size, width: across(choice, value) };
+}
+
+// What a size, or null for the window's, is called: a shape stays chosen while the size has its proportions.
+export function choiceOf(size, chosen) {
+  if (!size) return WINDOW;
+  const { width, height } = size;
+  if (SHAPES.includes(chosen) && (height === down(chosen, width) || width === across(chosen, height))) return chosen;
+  const named = Object.entries(SIZES).find(([, each]) => each.width === width && each.height === height);
+  return named?.[0] ?? CUSTOM;
+}
