@@ -5,12 +5,19 @@ import { axes, halfHeight, isInSight } from "./document/camera.js";
 import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
+import { lampShape, standOf, subjectOf } from "./document/lamps.js";
 import { ballOf, solids, union, wayOut } from "./document/placing.js";
 import { moved } from "./document/transforms.js";
 import { add, cross, normalize, scale, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
 const SUNS_APART = Math.PI / 6; // a copied sun shines from another side
+
+// The angles of a spot's beam that is as wide as what it is aimed at, in degrees.
+function beamAround(radius, distance) {
+  const angle = Math.min(60, (Math.atan2(radius, distance) * 180) / Math.PI);
+  return { inner_angle: Number(angle.toPrecision(2)), outer_angle: Number((1.4 * angle).toPrecision(2)) };
+}
 
 // The box around a scene: by its shapes, else by what its camera has in view.
 function sizeOf({ shapes }, camera) {
@@ -27,13 +34,36 @@ export class Adder {
   }
 
   // One of `additions`.
-  async add({ kind, title, make }) {
+  async add({ kind, title, make, shines }) {
     const { acts } = this;
+    if (shines) return this.#addLight(title, shines);
     const { materials } = acts.state.scene;
     const material = fresh(title.toLowerCase(), materials);
     const made = make(acts.camera, this.controller.radius(), material);
-    if (kind === "lights") return acts.add(kind, this.#apart(made));
     return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: made.type !== "quad" });
+  }
+
+  // A light that is aimed at the selection, from a side where none is, and half a stop over what is there.
+  async #addLight(title, type) {
+    const { acts } = this;
+    const { scene, chosen, view } = acts.state;
+    const subject = subjectOf(scene, chosen.thing, acts.camera);
+    const stand = standOf(scene, acts.camera, subject);
+    const { toLight, distance, position } = stand;
+    const irradiance = await this.controller.irradianceFor(subject.shapes, toLight, view.exposure ?? 0);
+    const power = (factor) => Number((irradiance * factor).toPrecision(2));
+    const direction = toLight.map((x) => Number((-x).toPrecision(4)) + 0);
+    if (type === "directional") {
+      return acts.add("lights", this.#apart({ type, direction, irradiance: power(1), angular_diameter: 0.53 }));
+    }
+    if (type === "point" || type === "spot") {
+      const beam = type === "spot" ? { direction, ...beamAround(subject.radius, distance) } : {};
+      return acts.add("lights", this.#apart({ type, position, ...beam, intensity: power(distance * distance) }));
+    }
+    const material = fresh(title.toLowerCase(), acts.state.scene.materials);
+    const { shape, area } = lampShape(type, stand, subject, material);
+    const own = { ...acts.blackMaterial, emission: power((distance * distance) / area) };
+    return acts.add("shapes", shape, { materials: { ...acts.state.scene.materials, [material]: own } });
   }
 
   async duplicate(thing) {

@@ -78,7 +78,7 @@ export class Importer {
     const info = await this.upload(file);
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
     if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
-    if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id });
+    if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
     else await this.#takeImage(info, file, at);
     return false;
   }

@@ -82,26 +82,6 @@ def test_what_is_added_or_copied_stands_beside_the_others(editor: Editor) -> Non
     assert len(places) == len(set(places)) == 4
 
 
-def test_a_light_is_selected_by_its_mark(editor: Editor) -> None:
-    page, mark = editor.page, "#markers .mark[data-thing='/lights/0']"
-    editor.tab("scene")
-    page.click("#outline-list [data-thing='/camera']")
-    assert page.locator("#markers .mark").count() == 1, "the camera's target"
-    editor.tab("scene")
-    page.select_option("#add", label="Point light")
-    box, stage = page.locator(mark).bounding_box(), page.locator("#stage").bounding_box()
-    assert box and stage and box["y"] < stage["y"] + 60, "above, at the edge while it is selected"
-    page.click("#markers .mark[data-thing='/camera']")
-    assert editor.text("#thing-title") == "Camera"
-    for _ in range(14):
-        page.keyboard.press("-")
-    editor.wait("the light in the picture", lambda: page.locator(mark).count() == 1)
-    page.click(mark)
-    assert editor.text("#thing-title") == "Point light"
-    editor.tab("material")
-    assert page.is_hidden("#markers"), "nothing lies over the picture while materials are looked at"
-
-
 def model() -> bytes:
     """A square whose material has a name that the first scene has, too, with a lamp and a camera."""
     file = gltf_files.Gltf()

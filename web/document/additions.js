@@ -1,17 +1,11 @@
 import { lightModels, shapeModels } from "../server/schema.js";
 
-// New things, in the middle of what is looked at: [{title, kind, make(camera, materials)}].
+// New things: [{title, kind, make(camera, radius, material)}], in the middle of what is looked at, and lights, which have
+// `shines` in the place of `make`: their type.
 export function additions(schema) {
   const shapes = shapeModels(schema);
   const lights = lightModels(schema);
   const near = ({ target }) => target.map((x) => Number(x.toFixed(3)));
-  const above = ({ target, position }) => {
-    const far = Math.hypot(...target.map((x, i) => x - position[i]));
-    return {
-      point: target.map((x, i) => Number((x + [0.3, 0.6, 0.3][i] * far).toFixed(3))),
-      strength: Number((far * far * 2).toPrecision(2)),
-    };
-  };
   const all = [
     {
       title: "Sphere",
@@ -42,31 +36,11 @@ export function additions(schema) {
         material,
       }),
     },
-    {
-      title: "Point light",
-      kind: "lights",
-      needs: lights.point,
-      make: (c) => ({ type: "point", position: above(c).point, intensity: above(c).strength }),
-    },
-    {
-      title: "Spot light",
-      kind: "lights",
-      needs: lights.spot,
-      make: (c) => ({
-        type: "spot",
-        position: above(c).point,
-        direction: near(c).map((x, i) => Number((x - above(c).point[i]).toFixed(3))),
-        intensity: 2 * above(c).strength,
-        inner_angle: 20,
-        outer_angle: 30,
-      }),
-    },
-    {
-      title: "Sun",
-      kind: "lights",
-      needs: lights.directional,
-      make: () => ({ type: "directional", direction: [-0.4, -1, -0.5], irradiance: 3, angular_diameter: 0.53 }),
-    },
+    { title: "Area light", kind: "shapes", needs: shapes.quad, shines: "quad" },
+    { title: "Sphere light", kind: "shapes", needs: shapes.sphere, shines: "sphere" },
+    { title: "Point light", kind: "lights", needs: lights.point, shines: "point" },
+    { title: "Spot light", kind: "lights", needs: lights.spot, shines: "spot" },
+    { title: "Sun", kind: "lights", needs: lights.directional, shines: "directional" },
   ];
   return all.filter(({ needs }) => needs);
 }

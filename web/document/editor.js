@@ -8,7 +8,7 @@ import { dressed } from "./dressing.js";
 import { exposed } from "./lighting.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { at, pointer, put } from "../lib/patch.js";
-import { defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
+import { blackMaterial, defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
 
 // The shape that the eye goes to: the first which is not flat.
@@ -51,6 +51,7 @@ export class Editor extends Store {
     this.forgive = forgive;
     this.waits = waits;
     this.plainMaterial = newMaterial(schema.scene);
+    this.blackMaterial = blackMaterial(schema.scene);
     this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
     const move =
       (how) =>
@@ -151,10 +152,11 @@ export class Editor extends Store {
     else this.#fetch("environments", name, (environment) => this.putEnvironment(environment, name));
   }
 
-  putEnvironment(environment, name = OWN) {
+  // `file`: the name of the one that it came from.
+  putEnvironment(environment, name = OWN, file = undefined) {
     this.change({
       ...put(this.state, "/scene/environment", environment),
-      chosen: { ...this.state.chosen, environment: name },
+      chosen: { ...this.state.chosen, environment: name, environmentFile: file },
     });
   }
 

@@ -1,10 +1,12 @@
 // What a scene consists of, in the order in which a list shows it.
 
+import { isLamp } from "./lamps.js";
 import { inWords } from "../lib/format-text.js";
 import { pointer } from "../lib/patch.js";
 
 // [{thing, icon, title, note}] of a scene.
-export function things({ environment, lights = [], shapes }) {
+export function things(scene) {
+  const { environment, lights = [], shapes } = scene;
   const count = {};
   const title = (type) => {
     count[type] = (count[type] ?? 0) + 1;
@@ -24,11 +26,11 @@ export function things({ environment, lights = [], shapes }) {
       title: title(`${type} light`),
       note: "",
     })),
-    ...shapes.map(({ type, material }, i) => ({
+    ...shapes.map((shape, i) => ({
       thing: pointer("shapes", i),
-      icon: type,
-      title: title(type),
-      note: material,
+      icon: isLamp(scene, shape) ? "light" : shape.type,
+      title: title(isLamp(scene, shape) ? `${shape.type === "quad" ? "area" : shape.type} light` : shape.type),
+      note: shape.material,
     })),
   ];
 }

@@ -13,6 +13,7 @@ export class UiState {
     clipping: false,
     checker: null,
     guides: false,
+    target: false,
     tab: "properties",
     drawer: "materials",
     theme: null,

@@ -10,6 +10,8 @@ import { compact, inWords, unitText } from "../lib/format-text.js";
 import { scrubBy } from "../lib/scrub.js";
 import { span } from "../lib/span.js";
 
+const STOPS = 8; // below and above 1 of the unit: how far a slider of strengths goes at least
+const exact = (x) => Number(x.toPrecision(5));
 const UNSET = "–"; // neither document nor schema has a value
 
 // A text field: one of type=number swallows what it does not understand, such as the comma of 0,35. Only where
@@ -226,6 +228,44 @@ function vector(field, id, { input, commit, refuse, restore }) {
   };
 }
 
+// Of light: a slider over stops that reaches as far as the value, the stops over 1 of the unit, and the value itself.
+function strengthControl(field, id, events) {
+  const named = (title, more) => ({ ...field, title, ranges: true, initial: undefined, ...more });
+  const title = `${field.title}, strength`;
+  const ends = { min: 2 ** -STOPS, max: 2 ** STOPS };
+  const range = track(named(title, { soft: ends }), `${id}-strength`, events);
+  const stops = numberEntry(
+    named(title, { unit: "", min: undefined, max: undefined, open: {}, soft: {}, ranges: undefined, step: 0.1 }),
+    `${id}-stops`,
+    { ...events, input: (value) => events.input(value === undefined ? undefined : exact(2 ** value)) },
+  );
+  const entry = numberEntry(named(title, {}), `${id}-strength-entry`, events);
+  range.element.setAttribute("aria-label", title);
+  stops.element.setAttribute("aria-label", `${title} in stops`);
+  entry.element.setAttribute("aria-label", `${title}, number`);
+  return {
+    element: element(
+      "div",
+      { class: "slider strength" },
+      range.element,
+      element("span", { class: "stops" }, stops.element, element("i", { "aria-hidden": "true" }, "stops")),
+      entry.element,
+    ),
+    show(value) {
+      // Once it is wider it stays so: it must not become another under the hand.
+      if (value > 0) {
+        ends.min = Math.min(ends.min, 2 ** (Math.floor(Math.log2(value)) - 2));
+        ends.max = Math.max(ends.max, 2 ** (Math.ceil(Math.log2(value)) + 2));
+      }
+      range.show(value, undefined, { ...ends });
+      stops.show(value > 0 ? Number(Math.log2(value).toFixed(2)) : null);
+      entry.show(value);
+      const told = value > 0 ? `${Number(Math.log2(value).toFixed(1))} stops, ` : "";
+      range.element.setAttribute("aria-valuetext", `${told}${compact(value)} ${unitText(field.unit)}`.trim());
+    },
+  };
+}
+
 // Swatch and text; a colour that may pass 1 is split into a tint and a strength.
 function color(field, id, { input, commit, refuse, restore }) {
   const bright = !(field.max <= 1);
@@ -293,7 +333,7 @@ function color(field, id, { input, commit, refuse, restore }) {
   const row = element("div", { class: "color" }, swatch, text, mode);
   const power =
     bright &&
-    slider({ ...field, title: `${field.title}, strength` }, `${id}-strength`, {
+    strengthControl(field, id, {
       input: (value) => {
         strength = value ?? 0;
         give();
@@ -302,7 +342,6 @@ function color(field, id, { input, commit, refuse, restore }) {
       refuse,
       restore,
     });
-  if (power) power.element.querySelector("input").setAttribute("aria-label", `${field.title}, strength`);
 
   return {
     element: power ? element("div", {}, row, power.element) : row,

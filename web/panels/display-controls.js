@@ -10,6 +10,7 @@ const OVERLAYS = {
   clipping: "Clipped pixels",
   checker: "Checker behind alpha",
   guides: "Guides",
+  target: "What the camera looks at",
 };
 
 export class DisplayControls {

@@ -40,7 +40,8 @@ export class ThingPart {
     else this.#made = null;
     const { environment } = chosen;
     const name = this.environments.find((each) => each.name === environment)?.title;
-    this.#find("environment-name").textContent = name ?? (environment === null ? "" : "The scene's own");
+    this.#find("environment-name").textContent =
+      name ?? chosen.environmentFile ?? (environment === null ? "" : "The scene's own");
   }
 
   #model(document) {
@@ -112,6 +113,8 @@ export class ThingPart {
         ),
       ),
     );
+    const rotation = this.#find("thing-form").querySelector("[data-field=rotation] input[type=range]");
+    rotation?.setAttribute("aria-label", "Environment rotation");
   }
 
   // Imported parts stand by a matrix: the form shows it as a move, a turn and a scale, which an edit makes of it.

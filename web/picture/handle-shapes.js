@@ -12,7 +12,8 @@ const SHORT_PX = 14; // an arrow that points at the eye is too short to be dragg
 const FACING = 0.2; // the cosine below which a plane is seen too edge-on to be dragged
 const HEAD_PX = 12;
 
-function shape(tag, attributes, ...children) {
+// An SVG element with attributes and children.
+export function shape(tag, attributes, ...children) {
   const node = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
   node.append(...children);

@@ -2,9 +2,11 @@
 
 import { ball, box, together } from "../document/bounds.js";
 import { axes, frame, ray } from "../document/camera.js";
+import { lampsOf } from "../document/lamps.js";
 import { watchGestures } from "./gestures.js";
 import { HANDLED, Handles } from "./handles.js";
 import { Inspector } from "./inspector.js";
+import { irradianceFor } from "./light-there.js";
 import { Markers } from "./markers.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { Picker, drawOutline } from "../document/picking.js";
@@ -41,7 +43,7 @@ export class ViewportController {
       viewport,
       stream,
     );
-    this.markers = new Markers(find("markers"), acts);
+    this.markers = new Markers(find("markers"), acts, parts.say);
     this.handles = new Handles(find("handles"), {
       acts,
       tool: () => ui.state.tool,
@@ -113,14 +115,16 @@ export class ViewportController {
     this.mark();
   }
 
-  // Where lights and the camera's target are, while one of these is selected and no material is looked at.
+  // Where lights are, while one of these, the environment or the camera is selected and no material is looked at.
   mark() {
-    const { thing } = this.acts.state.chosen;
-    const isOn = /^\/(camera|environment|lights)/.test(thing) && this.ui.state.tool !== "inspect";
-    if (isOn) fitGuides(this.find("markers"), this.root, this.viewport.canvas);
-    this.markers.show(isOn, this.aspect);
+    const { scene, chosen } = this.acts.state;
+    const { tool, target } = this.ui.state;
+    const isLight = lampsOf(scene).some(({ thing }) => thing === chosen.thing);
+    const isOn = (isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect";
+    const tall = fitGuides(this.find("markers"), this.root, this.viewport.canvas);
+    this.markers.show(isOn, this.aspect, tall, target);
     const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
-    this.handles.show(HANDLED.includes(this.ui.state.tool), this.aspect, height);
+    this.handles.show(HANDLED.includes(tool), this.aspect, height);
   }
 
   // Histogram and clipping follow the picture at their own pace.
@@ -194,6 +198,11 @@ export class ViewportController {
     if (known.every(Boolean)) return known;
     const seen = await this.picker.boxes(scene, this.acts.camera, BRIEF_MS).catch(() => new Map());
     return known.map((each, i) => each ?? seen.get(i) ?? null);
+  }
+
+  // As in light-there.js.
+  irradianceFor(shapes, toLight, exposure) {
+    return irradianceFor(this.stream, shapes, toLight, exposure);
   }
 
   // What of the camera has to change for a ball to fill the picture.

@@ -1,0 +1,132 @@
+"""Lights as things: added where they light the selection, marked in the picture, and slid round it by hand."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.editing import document
+
+SETTINGS = {"width": 48, "height": 48, "max_samples": 64, "max_bounces": 3, "seed": 1}
+
+
+def add(editor: Editor, title: str) -> Any:
+    """The scene after a light was added."""
+    count = editor.page.locator("#outline-list [role=option]").count()
+    editor.outline(shown=True)
+    editor.page.select_option("#add", label=title)
+    editor.wait(title, lambda: editor.page.locator("#outline-list [role=option]").count() == count + 1)
+    return document(editor)
+
+
+def radiance(server: Server, scene: Any) -> float:
+    """The mean luminance of the ball in the middle of the picture."""
+    body = {"scene": scene, "settings": SETTINGS}
+    answer = httpx.post(f"{server.url}/v1/render?format=npy", json=body, timeout=180).raise_for_status()
+    image = np.load(io.BytesIO(answer.content))[12:36, 12:36, :3]
+    return float((image @ [0.2126, 0.7152, 0.0722]).mean())
+
+
+def aim(quad: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The middle of a rectangle, and the direction to which it shines."""
+    origin, u, v = (np.array(quad[name]) for name in ("origin", "u", "v"))
+    normal = np.cross(u, v)
+    return origin + (u + v) / 2, normal / np.linalg.norm(normal)
+
+
+def test_area_lights_are_aimed_at_the_selection_and_slide_round_it(editor: Editor, server: Server) -> None:
+    page = editor.page
+    editor.settled()
+    before = document(editor)
+    first = add(editor, "Area light")
+    ball = np.array([0, 1, 0])
+    middle, normal = aim(first["shapes"][2])
+    way = ball - middle
+    assert normal @ way / np.linalg.norm(way) == pytest.approx(1, abs=1e-3), "it faces the ball"
+    lamp = first["materials"]["area light"]
+    assert lamp["emission"] > 0 and editor.chosen("materials") == "area light"
+    gain = radiance(server, first) / radiance(server, before)
+    assert 1.2 < gain < 1.7, f"half a stop over what is there, not {gain:.2f} times"
+
+    second = add(editor, "Area light")
+    other, normal = aim(second["shapes"][3])
+    assert normal @ (ball - other) > 0.99 * np.linalg.norm(ball - other), "at the ball again, not at the first light"
+    cosine = (middle - ball) @ (other - ball) / np.linalg.norm(middle - ball) / np.linalg.norm(other - ball)
+    assert cosine < np.cos(np.radians(40)), "from another side"
+
+    # The mark of a light outside the frame stands at its edge.
+    mark = page.locator("#markers .mark.chosen")
+    box = mark.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def slide(right: float, down: float) -> Any:
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + right / 2, y + down / 2)
+        page.mouse.move(x + right, y + down)
+        page.mouse.up()
+        return aim(document(editor)["shapes"][3])
+
+    slid, normal = slide(-60, 0)
+    distance = np.linalg.norm(other - ball)
+    assert np.linalg.norm(slid - other) > 0.2 and np.linalg.norm(slid - ball) == pytest.approx(distance, rel=1e-3)
+    assert normal @ (ball - slid) == pytest.approx(distance, rel=1e-3), "and it still faces the ball"
+    page.keyboard.press("Control+z")
+    assert aim(document(editor)["shapes"][3])[0] == pytest.approx(other), "one step of undo"
+
+    mark.focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Shift+ArrowUp")
+    stepped, normal = aim(document(editor)["shapes"][3])
+    assert np.linalg.norm(stepped - ball) == pytest.approx(1.04 * distance, rel=1e-3), "Shift changes the distance"
+    assert normal @ (ball - stepped) == pytest.approx(1.04 * distance, rel=1e-3)
+
+    page.click("#outline-list [data-thing='/shapes/0']")
+    assert page.is_hidden("#markers"), "nothing lies over the picture while materials are looked at"
+
+
+def test_marks_and_strengths(editor: Editor) -> None:
+    page = editor.page
+    editor.settled()
+    page.click("#outline-list [data-thing='/camera']")
+    assert page.locator("#markers .mark").count() == 0, (
+        "what the camera looks at has a mark only where it is asked for"
+    )
+    editor.tab("view")
+    page.check("#show-target")
+    page.keyboard.press("Escape")
+    assert page.get_by_role("button", name="What the camera looks at").count() == 1
+
+    scene = add(editor, "Sphere light")
+    (lamp,) = [shape for shape in scene["shapes"] if shape["material"] == "sphere light"]
+    assert lamp["type"] == "sphere" and lamp["center"][1] > 1
+    for _ in range(14):
+        page.locator("#stage").press("-")
+    outline = page.locator("#markers .lamp.chosen")
+    editor.wait("its outline", lambda: outline.count() == 1)
+    page.locator("#outline-list [data-thing='/camera']").click()
+    page.locator("#markers .lamp").click(force=True)
+    assert page.get_attribute("#outline-list [data-thing='/shapes/2']", "aria-selected") == "true"
+
+    scene = add(editor, "Point light")
+    strength = page.get_by_role("slider", name="Intensity, strength")
+    assert "stops" in str(strength.get_attribute("aria-valuetext"))
+    stops = page.get_by_label("Intensity, strength in stops")
+    before = scene["lights"][0]["intensity"]
+    shown = float(stops.input_value())
+    assert 2**shown == pytest.approx(before, rel=0.01)
+    stops.fill(str(shown + 9))
+    stops.press("Enter")
+    editor.wait("nine stops more", lambda: np.max(document(editor)["lights"][0]["intensity"]) > 400 * before)
+    assert 0.5 < float(strength.input_value()) < 1, "the slider reaches as far as the value"
+
+    page.click("#outline-list [data-thing='/environment']")
+    page.get_by_role("slider", name="Environment rotation").fill("90")
+    assert document(editor)["environment"]["rotation"] == 90
