@@ -3,6 +3,7 @@
 import { amount } from "./lib/format-text.js";
 import { watchMenu } from "./lib/menu.js";
 import { essence, linkTo, revived } from "./document/share.js";
+import { WhenClean } from "./panels/when-clean.js";
 import { ExportMenu, handOut } from "./panels/export-menu.js";
 import { SceneMenu } from "./panels/scene-menu.js";
 import * as exporting from "./picture/export.js";
@@ -42,8 +43,10 @@ export function makeHeader({
       announce: say,
     },
   });
+  const whenClean = new WhenClean({ page, editor, messages });
   const exportMenu = new ExportMenu(find("export-menu"), {
-    name: () => editor.state.chosen.scene.replaceAll(/[^\w-]+/g, "-") || "scene",
+    title: () => titleOf(editor.state.chosen) || "Your own scene",
+    isWanted: () => whenClean.isWanted(),
     scene: () => editor.state.scene,
     material: () => editor.materialSet,
     png: (bits) => exporting.png(stream, bits, recipes.madeFrom),

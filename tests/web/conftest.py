@@ -282,6 +282,9 @@ class Editor:
             self.page.click("#export")
         with self.page.expect_download() as waiting:
             self.page.click(click)
+            now = self.page.get_by_role("button", name="Save now")
+            if now.is_visible():
+                now.click()
         return waiting.value.path().read_bytes()
 
     def field(self, name: str, kind: str = "range", form: str = "#panel") -> str:

@@ -244,6 +244,8 @@ def test_the_download_is_the_rendered_picture(editor: Editor) -> None:
     editor.page.click("#export")
     with editor.page.expect_download() as waiting:
         editor.page.click("#download")
+        if (now := editor.page.get_by_role("button", name="Save now")).is_visible():
+            now.click()
     path = waiting.value.path()
     picture = Image.open(io.BytesIO(path.read_bytes()))
     picture.load()

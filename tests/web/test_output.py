@@ -168,3 +168,37 @@ def test_a_render_is_opened_and_its_scene_again(editor: Editor) -> None:
     window.get_by_role("button", name="Edit its scene").click()
     editor.wait("its scene", lambda: editor.text("#scene-title") == "Two point lights")
     assert size(editor) == [64, 48]
+
+
+def test_a_noisy_picture_is_saved_now_or_when_it_is_clean(editor: Editor) -> None:
+    page = editor.page
+    editor.tab("render")
+    entry = page.locator("#settings-form [data-field=max_samples] input")
+    entry.fill("100000")
+    entry.press("Enter")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("p")
+    asked = page.get_by_role("dialog", name="noise: save now or when clean?")
+    asked.get_by_role("button", name="When clean").click()
+    waits = "The PNG is saved when the picture is clean."
+    assert waits in editor.text("#messages")
+    page.get_by_role("button", name="Cancel").click()
+    editor.wait("silence", lambda: waits not in editor.text("#messages"))
+    page.keyboard.press("p")
+    with page.expect_download() as waiting:
+        asked.get_by_role("button", name="When clean").click()
+        entry.fill("2")
+        entry.press("Tab")
+        editor.wait("the words", lambda: "has changed" in editor.text("#messages"))
+        editor.wait("the end", lambda: editor.text("#state") == "Done")
+        page.evaluate("document.activeElement.blur()")
+        page.keyboard.press("p")  # of what gets no cleaner nobody is asked
+    assert re.fullmatch(r"Sphere-on-a-floor-\d+x\d+-\d+.png", waiting.value.suggested_filename)
+    entry.fill("100000")
+    entry.press("Tab")
+    page.evaluate("document.activeElement.blur()")
+    editor.wait("samples", lambda: editor.text("#state") == "Converging")
+    page.keyboard.press("p")
+    with page.expect_download() as waiting:
+        asked.get_by_role("button", name="When clean").click()
+    assert int(waiting.value.suggested_filename.split("-")[-1].removesuffix(".png")) > 1

@@ -1,20 +1,22 @@
 // What leaves the page as a file or a command: the items of the menu "Export".
 
+import { documentFile, pictureFile } from "../document/file-name.js";
 import { element } from "../lib/dom.js";
 import { jsonBlob, saveAs } from "../lib/files.js";
 
 export class ExportMenu {
-  // `acts`: name() of the scene for files, scene(), material(), png(bits) and exr() -> {blob, header}, command(),
-  // complain(error), announce(text).
+  // `acts`: title() of the scene, scene(), material(), png(bits) and exr() -> {blob, header}, isWanted() resolves to
+  // whether the PNG is to be saved, command(), complain(error), announce(text).
   constructor(root, acts) {
     this.acts = acts;
     const picture = (make, ending) => () =>
       this.#try(async () => {
+        if (ending === "png" && !(await acts.isWanted())) return;
         const { blob, header } = await make();
-        saveAs(blob, `sunbox-${acts.name()}-${header.samples}.${ending}`);
+        saveAs(blob, pictureFile(acts.title(), header, ending));
       });
     this.png = picture(() => acts.png(8), "png");
-    const json = (kind) => () => saveAs(jsonBlob(acts[kind]()), `sunbox-${acts.name()}-${kind}.json`);
+    const json = (kind) => () => saveAs(jsonBlob(acts[kind]()), documentFile(acts.title(), kind, "json"));
     const items = [
       ["PNG", "8 bit, as it is on screen", "download", this.png],
       ["PNG, 16 bit", "", "download-16", picture(() => acts.png(16), "png")],
