@@ -21,6 +21,10 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     assert rows.min() > 0.2 * editor.page.evaluate("picture.height"), "the floor ends at the horizon"
     click(editor, 0.5, 0.5)
     editor.wait("the ball", lambda: editor.chosen("materials") == "subject")
+    shown = "document.querySelector('#outline').classList.contains('shown')"
+    editor.wait("its outline", lambda: editor.page.evaluate(shown))
+    editor.page.wait_for_timeout(1500)
+    assert editor.page.evaluate(shown), "the outline stays while the selection and the view do"
     editor.tab("scene")
     assert editor.page.get_attribute("#outline-list [data-thing='/shapes/0']", "aria-selected") == "true"
     click(editor, 0.5, 0.02)

@@ -22,13 +22,12 @@ const EARLY = {
   select: "Nothing can be selected in the picture yet: it is still being prepared. The outline has everything.",
 };
 
-const OUTLINE_MS = 900;
 const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
 const OVERLAY_MS = 200; // between two histograms
 const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
 
 export class ViewportController {
-  #outlining = 0;
+  #outlined = {}; // what the outline was drawn of: it stays while that is so
   #overlaid = 0;
   #timer = null;
 
@@ -118,6 +117,9 @@ export class ViewportController {
   // Where lights are, while one of these, the environment or the camera is selected and no material is looked at.
   mark() {
     const { scene, chosen } = this.acts.state;
+    const { camera, shapes, thing } = this.#outlined;
+    if (scene.camera !== camera || scene.shapes !== shapes || chosen.thing !== thing)
+      this.find("outline").classList.remove("shown");
     const { tool, target } = this.ui.state;
     const isLight = lampsOf(scene).some(({ thing }) => thing === chosen.thing);
     const isOn = (isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect";
@@ -176,9 +178,10 @@ export class ViewportController {
       shape,
       getComputedStyle(this.root).getPropertyValue("--accent-bright"),
     );
+    const { camera, shapes } = scene;
+    this.#outlined = { camera, shapes, thing: this.acts.state.chosen.thing };
     this.find("outline").classList.add("shown");
-    clearTimeout(this.#outlining);
-    this.#outlining = setTimeout(() => this.find("outline").classList.remove("shown"), OUTLINE_MS);
+    this.mark();
   }
 
   async focus(place) {
