@@ -126,9 +126,12 @@ export class PictureList {
   }
 }
 
+const MARGIN = 8; // CSS pixels between an option in sight and the end of its row
+
 // Brings an option into its row's sight without moving the page.
 function reveal(row, option) {
   const [outer, inner] = [row.getBoundingClientRect(), option.getBoundingClientRect()];
-  if (inner.left < outer.left) row.scrollLeft += inner.left - outer.left - 8;
-  else if (inner.right > outer.right) row.scrollLeft += inner.right - outer.right + 8;
+  const [before, behind] = [inner.left - outer.left - MARGIN, inner.right - outer.right + MARGIN];
+  if (before < 0) row.scrollLeft += before;
+  else if (behind > 0) row.scrollLeft += behind;
 }
