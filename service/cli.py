@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | renders | bsdf | import | info | check-data | bench`.
+"""The command line: `sunbox serve | render | sweep | turntable | renders | bsdf | import | info | ...`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -51,6 +51,8 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
+    _sweep(commands.add_parser("sweep", help="render a scene with other values, onto a contact sheet"))
+    _turntable(commands.add_parser("turntable", help="render a turn of the camera about its target, as an animation"))
     _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
@@ -93,6 +95,30 @@ def _picture(command: argparse.ArgumentParser) -> None:
     add("--exposure", metavar="STOPS", help="for .png (default: 0)")
     curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
     add("--tone-map", metavar="NAME", help=f"for .png: {_any_of(curves)}")
+
+
+def _sweep(command: argparse.ArgumentParser) -> None:
+    _batch(command, "the contact sheet: .png, .jpg or .webp; or all pictures: .zip")
+    text = "values at a JSON pointer into the scene, as /materials/ball/roughness=0.1,0.5; more axes multiply"
+    command.add_argument("--over", action="append", required=True, metavar="/PATH=A,B", help=text)
+
+
+def _turntable(command: argparse.ArgumentParser) -> None:
+    _batch(command, "the animation: .webp, .png (APNG), .gif, .avif or .mp4; or all pictures: .zip")
+    add = command.add_argument
+    add("--frames", type=int, default=36, metavar="N", help="pictures of the turn (default: 36)")
+    add("--degrees", type=float, default=360.0, metavar="D", help="of the turn, about +Y (default: 360)")
+    add("--fps", type=float, default=24.0, metavar="N", help="pictures a second (default: 24)")
+
+
+def _batch(command: argparse.ArgumentParser, output: str) -> None:
+    add = command.add_argument
+    add("input", metavar="INPUT", help="a scene's JSON, or a PNG or EXR that Sunbox made")
+    add("-o", "--output", required=True, metavar="OUT", help=output)
+    add("--width", type=int, metavar="N", help="pixels of each picture in OUT, which are scaled down to it")
+    _settings(command)
+    add("--server", metavar="URL", help="a server that renders it (default: this machine, without one)")
+    _asset_root(command)
 
 
 def _renders(command: argparse.ArgumentParser) -> None:

@@ -2,6 +2,9 @@
 
 render         a picture of a document, into a file
 renders        the renders of a server: submitted, listed, waited for, fetched, cancelled
+sweep          a scene with other values, on a contact sheet
+turntable      a turn of the camera, as an animation
+own_server     a server for as long as a command needs one
 api            requests to a server
 serve          the editor and the API
 bsdf           curves of a material's BSDF, into a table or a figure

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from service.images.recipe import PictureView
     from service.pack import Packed
     from service.scene import Scene, Settings
+    from sunbox import Client
 
 WIDEST = 16.0  # most width over height of a picture whose size a model's file decides
 SHOWN_ERRORS = 8  # of a document: a mesh of NaN has a mistake in every line
@@ -182,3 +183,16 @@ def _value(text: str) -> Any:
         return load_json(text)
     except MalformedJson:
         return text
+
+
+def with_uploads(client: Client, source: Source, asset_root: Sequence[str]) -> Any:
+    """A source's scene, whose files are on the server."""
+    from service.assets import FileAssets
+    from service.scene import references
+
+    uploaded: dict[str, str] = {}
+    with refusals(), FileAssets(source.path.parent, asset_folders(asset_root)) as found:
+        for ref in references.references(source.document):
+            if not ref.startswith("sha256:"):
+                uploaded[ref] = client.upload(found.read(ref), Path(ref).name)
+    return references.renamed(source.document, lambda ref: uploaded.get(ref, ref))

@@ -37,11 +37,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _submit(client: Client, arguments: argparse.Namespace) -> int:
     """The id goes to stdout."""
-    from service.assets import FileAssets
     from service.commands.configuration import configuration
-    from service.commands.documents import asset_folders, read_settings, read_source, refusals
+    from service.commands.documents import read_settings, read_source, with_uploads
     from service.commands.models import is_model
-    from service.scene import references
 
     path, config = Path(arguments.input), configuration()
     if is_model(path, files.read(path)):
@@ -49,12 +47,7 @@ def _submit(client: Client, arguments: argparse.Namespace) -> int:
     source = read_source(path, arguments.asset_root, config)
     chosen = read_settings(arguments.set or [], config, source.settings)
     settings = chosen.model_dump(mode="json", exclude_unset=True)
-    with refusals(), FileAssets(path.parent, asset_folders(arguments.asset_root)) as found:
-        uploaded: dict[str, str] = {}
-        for ref in references.references(source.document):
-            if not ref.startswith("sha256:"):
-                uploaded[ref] = client.upload(found.read(ref), Path(ref).name)
-    scene = references.renamed(source.document, lambda ref: uploaded.get(ref, ref))
+    scene = with_uploads(client, source, arguments.asset_root)
     job = client.submit(scene, arguments.label, arguments.priority or 0, arguments.idempotency_key, **settings)
     print(job.id)
     return 0

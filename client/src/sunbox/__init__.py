@@ -1,8 +1,9 @@
 """Sunbox for programs: scenes in, pictures out, over HTTP and WebSocket.
 
-client           Client, Job, Picture, Stream: calls that wait
+client           Client, Job, Batch, Picture, Stream: calls that wait
 async_client     AsyncClient: the same calls to await; all that talks to a server is here and below
 async_job        a render on the server, and its picture
+async_batch      renders of one scene that differ along axes
 async_stream     a scene that is edited while frames of it arrive
 transport        requests, retries, uploads; refusals as exceptions
 errors           the exceptions
@@ -25,20 +26,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sunbox.async_batch import AsyncBatch
     from sunbox.async_client import AsyncClient
     from sunbox.async_job import AsyncJob, AsyncPicture
     from sunbox.async_stream import AsyncStream
-    from sunbox.client import Client, Job, Picture, Stream
+    from sunbox.client import Batch, Client, Job, Picture, Stream
     from sunbox.errors import Failed, NotFound, Refused, SunboxError, Unreachable
     from sunbox.frames import Frame
     from sunbox.lobes import Albedo, Bsdf, SpecularLobe
     from sunbox.local import render
 
 _PLACES = {
+    "async_batch": ("AsyncBatch",),
     "async_client": ("AsyncClient",),
     "async_job": ("AsyncJob", "AsyncPicture"),
     "async_stream": ("AsyncStream",),
-    "client": ("Client", "Job", "Picture", "Stream"),
+    "client": ("Batch", "Client", "Job", "Picture", "Stream"),
     "errors": ("Failed", "NotFound", "Refused", "SunboxError", "Unreachable"),
     "frames": ("Frame",),
     "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
@@ -48,10 +51,12 @@ _MODULE = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "Albedo",
+    "AsyncBatch",
     "AsyncClient",
     "AsyncJob",
     "AsyncPicture",
     "AsyncStream",
+    "Batch",
     "Bsdf",
     "Client",
     "Failed",

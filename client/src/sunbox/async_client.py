@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sunbox import files, lobes
+from sunbox.async_batch import AsyncBatch
 from sunbox.async_job import AsyncJob, AsyncPicture
 from sunbox.async_stream import AsyncStream
 from sunbox.transport import Transport
@@ -78,6 +79,28 @@ class AsyncClient:
             body["label"] = label
         key = {"idempotency-key": idempotency_key or uuid.uuid4().hex}  # so that it may be sent twice
         return AsyncJob(self._transport, (await self._transport.json("POST", "/v1/renders", body, key))["id"])
+
+    async def batch(
+        self,
+        scene: Any,
+        over: Any,
+        label: str | None = None,
+        priority: int = 0,
+        idempotency_key: str | None = None,
+        **settings: Any,
+    ) -> AsyncBatch:
+        """Renders of a scene that varies along axes. `over`: a list of axes, `{"path": "/materials/a/roughness",
+        "values": [...]}`, `{"patches": [...], "names": [...]}` or `{"turntable": n, "degrees": 360}`; they multiply,
+        and the last runs fastest. Or a dict of paths and values, an axis for each. The others as of `submit`."""
+        axes = [{"path": path, "values": values} for path, values in over.items()] if isinstance(over, dict) else over
+        body = {"scene": await self._transport.uploaded(scene), "settings": settings, "over": axes}
+        body |= {"priority": priority} | ({} if label is None else {"label": label})
+        key = {"idempotency-key": idempotency_key or uuid.uuid4().hex}
+        return AsyncBatch(self._transport, (await self._transport.json("POST", "/v1/batches", body, key))["id"])
+
+    def batch_of(self, id: str) -> AsyncBatch:
+        """A batch by its id; asks nothing."""
+        return AsyncBatch(self._transport, id)
 
     def job(self, id: str) -> AsyncJob:
         """A render by its id; asks nothing."""

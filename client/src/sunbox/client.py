@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from numpy.typing import ArrayLike
 
 from sunbox import files
+from sunbox.async_batch import AsyncBatch
 from sunbox.async_client import AsyncClient
 from sunbox.async_job import AsyncJob, AsyncPicture, Pixels, Status
 from sunbox.async_stream import AsyncStream
@@ -60,6 +61,22 @@ class Client:
     ) -> Job:
         """A render that goes on by itself, also when this program has ended."""
         return Job(run(self._client.submit(scene, label, priority, idempotency_key, **settings)))
+
+    def batch(
+        self,
+        scene: Any,
+        over: Any,
+        label: str | None = None,
+        priority: int = 0,
+        idempotency_key: str | None = None,
+        **settings: Any,
+    ) -> Batch:
+        """Renders of a scene that varies along axes, which go on when this program has ended."""
+        return Batch(run(self._client.batch(scene, over, label, priority, idempotency_key, **settings)))
+
+    def batch_of(self, id: str) -> Batch:
+        """A batch by its id; asks nothing."""
+        return Batch(self._client.batch_of(id))
 
     def job(self, id: str) -> Job:
         """A render by its id; asks nothing."""
@@ -148,6 +165,65 @@ class Job:
     def delete(self) -> None:
         """Ends it where it goes on, and deletes its picture."""
         run(self._job.delete())
+
+
+class Batch:
+    """The calls of `AsyncBatch`, which has their documentation, without `await`."""
+
+    def __init__(self, batch: AsyncBatch) -> None:
+        self._batch = batch
+
+    @property
+    def id(self) -> str:
+        return self._batch.id
+
+    def __repr__(self) -> str:
+        return f"Batch({self.id!r})"
+
+    def status(self, wait: float = 0) -> Status:
+        """`state`, `counts` by state, `renders` with the id and state of each, `eta_s`."""
+        return run(self._batch.status(wait))
+
+    def wait(self, progress: bool | None = None) -> Status:
+        """The status at the end. Ctrl-C cancels the batch."""
+        return run(self._batch.wait(progress))
+
+    def pictures(self, progress: bool | None = None) -> list[Picture]:
+        """All pictures at the end, in their order. Ctrl-C cancels the batch."""
+        return [Picture(each) for each in run(self._batch.pictures(progress))]
+
+    def as_completed(self) -> Iterator[tuple[int, Picture]]:
+        """Place and picture of each render, as soon as it is done."""
+        for place, picture in _each(self._batch.as_completed()):
+            yield place, Picture(picture)
+
+    def sheet(self, format: str = "png", width: int | None = None) -> bytes:
+        """A contact sheet of what there is: png, jpeg or webp."""
+        return run(self._batch.sheet(format, width))
+
+    def animation(self, format: str = "apng", fps: float = 24, width: int | None = None) -> bytes:
+        """What there is, one after the other: apng, webp, gif, avif or mp4."""
+        return run(self._batch.animation(format, fps, width))
+
+    def zip(self, format: str = "png", **view: Any) -> bytes:
+        """A zip of all pictures that there are."""
+        return run(self._batch.zip(format, **view))
+
+    def save_sheet(self, path: str | Path, width: int | None = None) -> None:
+        """The contact sheet in the format of the path's ending."""
+        run(self._batch.save_sheet(path, width))
+
+    def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None) -> None:
+        """The animation in the format of the path's ending; .png is an APNG."""
+        run(self._batch.save_animation(path, fps, width))
+
+    def cancel(self) -> None:
+        """Ends it; the pictures so far stay."""
+        run(self._batch.cancel())
+
+    def delete(self) -> None:
+        """Ends it where it goes on, and deletes it with its pictures."""
+        run(self._batch.delete())
 
 
 class Picture:

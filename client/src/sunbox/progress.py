@@ -25,6 +25,17 @@ class Line:
         noise = status["noise"]
         self._bar.set_postfix_str(status["state"] if noise is None else f"{noise:.1%} noise")
 
+    def show_batch(self, status: dict[str, Any]) -> None:
+        """Of a batch's status."""
+        if not self._shown:
+            return
+        if self._bar is None:
+            from tqdm.auto import tqdm
+
+            self._bar = tqdm(total=len(status["renders"]), unit="picture", leave=False, file=sys.stderr)
+        counts = status["counts"]
+        self._bar.update(counts["done"] + counts["failed"] + counts["cancelled"] - self._bar.n)
+
     def close(self) -> None:
         if self._bar is not None:
             self._bar.close()

@@ -1,0 +1,23 @@
+"""`sunbox turntable`: the camera goes round the scene; an animation of that."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from service.commands import files
+from service.commands.sweep import batch_file, ending
+
+FORMATS = {".webp": "webp", ".png": "apng", ".apng": "apng", ".gif": "gif", ".avif": "avif", ".mp4": "mp4"}
+
+
+def run(arguments: argparse.Namespace) -> int:
+    path = Path(arguments.output)
+    format = ending(path, FORMATS | {".zip": "zip"})
+    output = files.writable(path)
+    over = [{"turntable": arguments.frames, "degrees": arguments.degrees}]
+    if format == "zip":
+        batch_file(arguments, over, output, lambda batch: batch.zip())
+    else:
+        batch_file(arguments, over, output, lambda batch: batch.animation(format, arguments.fps, arguments.width))
+    return 0
