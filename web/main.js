@@ -16,11 +16,13 @@ import { fillSheet, watchKeys } from "./keys.js";
 import { LobePanel } from "./lobe/panel.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
+import { entire, visible } from "./document/outline.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
 import { pictureRecipes } from "./picture/picture-recipe.js";
 import { Preparing } from "./panels/preparing.js";
 import { detailWords, fieldTitles, problemText } from "./server/problem-text.js";
+import { offerUndo } from "./panels/replaced.js";
 import { SavedMaterials } from "./panels/saved-materials.js";
 import { blackMaterial, materialModels, modelNames } from "./server/schema.js";
 import { essence } from "./document/share.js";
@@ -126,7 +128,7 @@ const stream = new Stream({
     say("The picture is done");
   },
   refused(problem, valid) {
-    const places = editor.takeBack(problem, valid, (pointer, detail) =>
+    const places = editor.takeBack(problem, valid && { ...valid, scene: entire(valid.scene) }, (pointer, detail) =>
       panel.mark(pointer, sentence(detailWords(detail))),
     );
     // Said once: at the control, where that can be seen.
@@ -213,7 +215,7 @@ const panel = new Panel(find, {
   say,
   textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
 });
-const outliner = new Outliner(find, { schema: schema.scene, acts: editor, add: (offer) => adder.add(offer) });
+const outliner = new Outliner(find, { schema: schema.scene, acts: editor, add: (offer) => adder.add(offer), say });
 const frame = new Frame(find, ui);
 
 // --- the shelf ---
@@ -324,7 +326,7 @@ function push() {
   if (!page.info) return;
   const { sceneB } = editor;
   const { wanted } = page;
-  comparison.show(sceneB && { ...wanted, scene: sceneB }, page.isPaused);
+  comparison.show(sceneB && { ...wanted, scene: visible(sceneB, editor.state.chosen.hidden) }, page.isPaused);
   stream.show(wanted);
   root.classList.toggle("checker", page.isCheckered);
   find("compare").setAttribute("aria-pressed", String(sceneB !== null));
@@ -361,6 +363,7 @@ function showUi() {
 }
 
 editor.subscribe(refresh);
+offerUndo(editor, messages, titleOf);
 ui.subscribe(showUi);
 
 let resizing = 0;

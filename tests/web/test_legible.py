@@ -59,7 +59,7 @@ def test_values_fit_into_their_boxes(at: Editor) -> None:
     at.wait("the scene", lambda: page.input_value(hexes) == "#ca4b36")
     assert page.evaluate(CUT) == []
     shown: set[str] = set()
-    for thing in page.locator("#outline-list [role=option]").all():
+    for thing in page.locator("#outline-list [role=treeitem]").all():
         at.tab("scene")
         thing.click()
         assert page.evaluate(CUT) == [], thing.text_content()

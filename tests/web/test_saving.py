@@ -233,7 +233,7 @@ def test_json_leaves_and_comes_back(editor: Editor) -> None:
 
 def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.settled()
-    things = editor.page.locator("#outline-list [role=option]")
+    things = editor.page.locator("#outline-list [role=treeitem]")
     editor.drop("#stage", {"triangle.obj": TRIANGLE})
     editor.tab("scene")
     editor.wait("the mesh", lambda: things.count() == 5 and editor.text("#thing-title") == "Mesh")
@@ -296,7 +296,7 @@ def test_things_are_added_moved_and_removed(editor: Editor) -> None:
 
 def test_the_last_thing_cannot_be_deleted(editor: Editor) -> None:
     """A scene keeps a shape: also the one that moved up into the place of another of its kind."""
-    acts, things = editor.page.locator("#thing-acts"), editor.page.locator("#outline-list [role=option]")
+    acts, things = editor.page.locator("#thing-acts"), editor.page.locator("#outline-list [role=treeitem]")
     editor.tab("scene")
     editor.page.click("#outline-list [data-thing='/shapes/1']")
     acts.get_by_text("Delete").click()

@@ -59,7 +59,7 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
 def test_what_is_added_or_copied_stands_beside_the_others(editor: Editor) -> None:
     page = editor.page
     editor.tab("scene")
-    things = page.locator("#outline-list [role=option]")
+    things = page.locator("#outline-list [role=treeitem]")
     for i, thing in enumerate(("Sphere", "Box", "Quad", "Point light", "Sun")):
         page.select_option("#add", label=thing)
         editor.wait(thing, lambda count=5 + 2 * i: things.count() == count)

@@ -10,6 +10,7 @@ import { carried, missingWords, received, unpacked, withTextures, withdrawn } fr
 import { at, pointer, put } from "../lib/patch.js";
 import { blackMaterial, defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
+import { without } from "./outline.js";
 
 // The shape that the eye goes to: the first which is not flat.
 function subject({ shapes }) {
@@ -314,11 +315,7 @@ export class Editor extends Store {
   }
 
   remove(thing) {
-    const [, kind, index] = thing.split("/");
-    const { scene, chosen } = this.state;
-    const left = scene[kind].filter((_, i) => i !== Number(index));
-    const next = left.length ? pointer(kind, Math.min(Number(index), left.length - 1)) : "/camera";
-    this.change({ scene: { ...scene, [kind]: left }, chosen: { ...chosen, thing: next } });
+    this.change(without(this.state, [thing]));
   }
 
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and

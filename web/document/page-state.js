@@ -1,6 +1,7 @@
 // What the page knows of its picture, and what follows from that: the renderer's greeting, the newest frame, whether
 // it is paused, connected, done; the size and the limit that hold for the next one.
 
+import { visible } from "./outline.js";
 import { inWords } from "../lib/format-text.js";
 import { defaults } from "../server/schema.js";
 import { DISPLAY, contained, pictureSize, viewOf } from "./picture-view.js";
@@ -79,7 +80,8 @@ export class PageState {
       quality: PAUSED_QUALITY,
       isExact: this.editor.sceneB !== null,
     });
-    return { scene: this.editor.state.scene, settings: this.settings, view };
+    const { scene, chosen } = this.editor.state;
+    return { scene: visible(scene, chosen.hidden), settings: this.settings, view };
   }
 
   // Looks up what the quality preset makes of the settings that are not given.

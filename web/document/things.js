@@ -4,6 +4,9 @@ import { isLamp } from "./lamps.js";
 import { inWords } from "../lib/format-text.js";
 import { pointer } from "../lib/patch.js";
 
+// The last part of a name, which may be a path.
+const own = (name = "") => name.split("/").filter(Boolean).at(-1) ?? "";
+
 // [{thing, icon, title, note}] of a scene.
 export function things(scene) {
   const { environment, lights = [], shapes } = scene;
@@ -20,16 +23,18 @@ export function things(scene) {
       title: "Environment",
       note: environment ? inWords(environment.type) : "None",
     },
-    ...lights.map(({ type }, i) => ({
+    ...lights.map(({ name, type }, i) => ({
       thing: pointer("lights", i),
       icon: "light",
-      title: title(`${type} light`),
+      title: own(name) || title(`${type} light`),
       note: "",
     })),
     ...shapes.map((shape, i) => ({
       thing: pointer("shapes", i),
       icon: isLamp(scene, shape) ? "light" : shape.type,
-      title: title(isLamp(scene, shape) ? `${shape.type === "quad" ? "area" : shape.type} light` : shape.type),
+      title:
+        own(shape.name) ||
+        title(isLamp(scene, shape) ? `${shape.type === "quad" ? "area" : shape.type} light` : shape.type),
       note: shape.material,
     })),
   ];

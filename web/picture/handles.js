@@ -1,6 +1,7 @@
 // Handles over the picture by which a hand moves, turns and scales what is selected: red along X, green along Y, blue
 // along Z. The arrow keys do the same by steps.
 
+import { isOn } from "../document/outline.js";
 import { ownBox, see } from "../document/bounds.js";
 import { axes } from "../document/camera.js";
 import { groundUnder } from "../document/ground.js";
@@ -64,7 +65,7 @@ export class Handles {
   get isActive() {
     const document = this.#document;
     const tool = this.tool();
-    if (!HANDLED.includes(tool) || !document) return false;
+    if (!HANDLED.includes(tool) || !document || isOn(this.acts.state, "locked", [this.#thing])) return false;
     if (this.#isEnvironment) return tool === "rotate";
     if (this.#thing.startsWith("/shapes/")) return true;
     if (!this.#thing.startsWith("/lights/")) return false;

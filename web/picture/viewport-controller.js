@@ -12,6 +12,7 @@ import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from 
 import { Picker, drawOutline } from "../document/picking.js";
 import { NotReady } from "../server/stream.js";
 import { watchToolbar } from "../lib/tabs.js";
+import { isOn } from "../document/outline.js";
 import { at, pointer } from "../lib/patch.js";
 import { dot } from "../lib/vector.js";
 import { inWords } from "../lib/format-text.js";
@@ -170,6 +171,7 @@ export class ViewportController {
       this.acts.select("/environment");
       return this.say("Environment selected");
     }
+    if (isOn(this.acts.state, "locked", [pointer("shapes", shape)])) return this.say("It is locked");
     this.acts.select(pointer("shapes", shape));
     this.say(`${inWords(scene.shapes[shape].material)} selected`);
     drawOutline(

@@ -1,5 +1,6 @@
 // Final pictures: what is to be rendered, the renders that the server has, and what becomes of them.
 
+import { visible } from "../document/outline.js";
 import { renderScene } from "../server/api.js";
 import { RenderFiles } from "./files.js";
 import { RenderList } from "./list.js";
@@ -99,9 +100,9 @@ export class FinalPictures {
   }
 
   async #start(size) {
-    const { scene, settings } = this.editor.state;
+    const { scene, settings, chosen } = this.editor.state;
     const label = this.title().slice(0, LONGEST_LABEL);
-    await this.renders.submit({ scene, settings: { ...settings, ...size }, label });
+    await this.renders.submit({ scene: visible(scene, chosen.hidden), settings: { ...settings, ...size }, label });
     this.say("The render waits for its turn");
   }
 
