@@ -4,8 +4,7 @@
 import { pointer, put } from "../lib/patch.js";
 import { things } from "./things.js";
 
-const HIDDEN = "(hidden)"; // the material of what is hidden
-const NOTHING = { type: "diffuse", albedo: 0, alpha: 0 };
+const unseen = (name) => `${name} (hidden)`; // the material of what is hidden
 
 const pathOf = ({ name = "" }) => name.split("/").filter(Boolean);
 
@@ -103,12 +102,19 @@ export function visible(scene, hidden = []) {
   if (known?.hidden === hidden) return known.scene;
   const isHidden = (kind, i) => hidden.includes(pointer(kind, i));
   const { environment, lights, ...rest } = scene;
+  const used = new Set(scene.shapes.filter((_, i) => isHidden("shapes", i)).map(({ material }) => material));
+  const passed = [...used].map((name) => {
+    const { emission, ...material } = scene.materials[name];
+    return [unseen(name), { ...material, alpha: 0 }];
+  });
   const made = {
     ...rest,
     ...(environment && !hidden.includes("/environment") ? { environment } : {}),
     ...(lights ? { lights: lights.filter((_, i) => !isHidden("lights", i)) } : {}),
-    materials: { ...scene.materials, [HIDDEN]: NOTHING },
-    shapes: scene.shapes.map((shape, i) => (isHidden("shapes", i) ? { ...shape, material: HIDDEN } : shape)),
+    materials: { ...scene.materials, ...Object.fromEntries(passed) },
+    shapes: scene.shapes.map((shape, i) =>
+      isHidden("shapes", i) ? { ...shape, material: unseen(shape.material) } : shape,
+    ),
   };
   shown.set(scene, { hidden, scene: made });
   whole.set(made, scene);
