@@ -5,14 +5,18 @@ from __future__ import annotations
 import asyncio
 import json
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
+from pydantic import BaseModel, ConfigDict, Field
 
 from service import scene
+from service.problems import FieldError, InvalidDocument
 from service.routes import answers
 from service.routes.metrics import MIME, scrape
+from service.scene import brief
+from service.scene.material import MODELS
 from service.state import app_state
 from service.streams import protocol
 
@@ -56,14 +60,29 @@ async def info(request: Request) -> dict[str, Any]:
     return await app_state(request).info()
 
 
+class SchemaQuery(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    model: Annotated[str | None, Field(description="Of the material of this `type` alone.")] = None
+    brief: Annotated[bool, Field(description="With `model`: a line for each field, for who writes one.")] = False
+
+
 @router.get(
     "/v1/schema",
     summary="JSON Schema of Scene, Settings and the stream's View",
+    description="With `model`, the schema of one material's model; with `brief` too, in few words: range, unit, "
+    "default and a line of each field.",
     response_class=JSONResponse,
-    responses=answers.shaped(answers.Schemas),
+    responses=answers.shaped(answers.Schemas) | answers.problems(422),
 )
-async def schema() -> Response:
-    return Response(await asyncio.to_thread(_schema), media_type="application/json")
+async def schema(query: Annotated[SchemaQuery, Query()]) -> Response:
+    if query.model is None:
+        if query.brief:
+            raise InvalidDocument([FieldError("/brief", "needs `model` beside it")])
+        return Response(await asyncio.to_thread(_schema), media_type="application/json")
+    found = await asyncio.to_thread(_model, query.model)
+    if found is None:
+        raise InvalidDocument([FieldError("/model", f"is not one of {', '.join(sorted(MODELS))}")])
+    return JSONResponse(brief.brief(found) if query.brief else found)
 
 
 @cache
@@ -71,3 +90,7 @@ def _schema() -> bytes:
     """The schemas as JSON; they never change, and making them takes 0.2 s."""
     document = scene.schema() | {"view": protocol.View.model_json_schema()}
     return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def _model(model: str) -> dict[str, Any] | None:
+    return brief.model_schema(json.loads(_schema())["scene"], model)

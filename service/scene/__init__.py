@@ -15,6 +15,7 @@ patch           JSON merge patches
 axes            what varies from one render of a batch to the next
 references      the assets that a document refers to
 saved_material  a material as users save it, with its textures
+brief           a material's model in few words
 schema          the schema that editors are made from
 """
 
