@@ -116,6 +116,7 @@ def _batch(command: argparse.ArgumentParser, output: str) -> None:
     add("input", metavar="INPUT", help="a scene's JSON, or a PNG or EXR that Sunbox made")
     add("-o", "--output", required=True, metavar="OUT", help=output)
     add("--width", type=int, metavar="N", help="pixels of each picture in OUT, which are scaled down to it")
+    add("--exposure", type=float, default=0.0, metavar="STOPS", help="of the pictures (default: 0)")
     _settings(command)
     add("--server", metavar="URL", help="a server that renders it (default: this machine, without one)")
     _asset_root(command)

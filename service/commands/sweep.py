@@ -23,9 +23,11 @@ def run(arguments: argparse.Namespace) -> int:
     format = ending(path, SHEETS | {".zip": "zip"})
     output = files.writable(path)
     if format == "zip":
-        batch_file(arguments, over, output, lambda batch: batch.zip())
+        batch_file(arguments, over, output, lambda batch: batch.zip(exposure=arguments.exposure))
     else:
-        batch_file(arguments, over, output, lambda batch: batch.sheet(format, arguments.width))
+        batch_file(
+            arguments, over, output, lambda batch: batch.sheet(format, arguments.width, exposure=arguments.exposure)
+        )
     return 0
 
 

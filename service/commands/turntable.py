@@ -17,7 +17,8 @@ def run(arguments: argparse.Namespace) -> int:
     output = files.writable(path)
     over = [{"turntable": arguments.frames, "degrees": arguments.degrees}]
     if format == "zip":
-        batch_file(arguments, over, output, lambda batch: batch.zip())
+        batch_file(arguments, over, output, lambda batch: batch.zip(exposure=arguments.exposure))
     else:
-        batch_file(arguments, over, output, lambda batch: batch.animation(format, arguments.fps, arguments.width))
+        fps, width, exposure = arguments.fps, arguments.width, arguments.exposure
+        batch_file(arguments, over, output, lambda batch: batch.animation(format, fps, width, exposure=exposure))
     return 0

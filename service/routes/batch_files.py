@@ -35,7 +35,6 @@ from service.system.executors import writing
 
 SheetFormat = Literal["png", "jpeg", "webp"]
 SHEET_FORMATS: tuple[SheetFormat, ...] = get_args(SheetFormat)
-DISPLAY = View("color", 0.0, "pbr_neutral", "u1")
 FRAMES = 64  # times SUNBOX_MAX_PIXELS: pixels of an animation
 MOST_KEPT = 4  # files of one batch that are not made again when they are asked for again
 LONGEST_NAME = 80  # characters in the name of a zipped file
@@ -100,7 +99,9 @@ class _Unseekable(io.RawIOBase):
         return b"".join(pieces)
 
 
-async def sheet(request: Request, batch: Batch, format: SheetFormat, width: int | None, steps: list[int]) -> Response:
+async def sheet(
+    request: Request, batch: Batch, format: SheetFormat, width: int | None, view: View, steps: list[int]
+) -> Response:
     """A contact sheet; its cells say of the renders that have no picture how far they are."""
     cell = _scaled(batch, steps, width)
     layout = _layout(batch, cell)
@@ -113,7 +114,7 @@ async def sheet(request: Request, batch: Batch, format: SheetFormat, width: int 
 
     async def fill(folder: Path) -> Callable[[BinaryIO], None]:
         pictures = _Spooled(folder / "pictures", cell)
-        await pictures.fill(batch, steps)
+        await pictures.fill(batch, steps, view)
         places = {step: i for i, step in enumerate(steps)}
 
         def write(file: BinaryIO) -> None:
@@ -125,11 +126,19 @@ async def sheet(request: Request, batch: Batch, format: SheetFormat, width: int 
 
         return write
 
-    return await _made(request, batch, ("sheet", format, width), steps, images.FORMATS[format].mime, 3 * pixels, fill)
+    return await _made(
+        request, batch, ("sheet", format, width, view), steps, images.FORMATS[format].mime, 3 * pixels, fill
+    )
 
 
 async def animated(
-    request: Request, batch: Batch, format: AnimationFormat, fps: float, width: int | None, steps: list[int]
+    request: Request,
+    batch: Batch,
+    format: AnimationFormat,
+    fps: float,
+    width: int | None,
+    view: View,
+    steps: list[int],
 ) -> Response:
     cell = _scaled(batch, steps, width)
     pixels, most = cell[0] * cell[1] * batch.order.renders, FRAMES * app_state(request).config.max_pixels
@@ -146,7 +155,7 @@ async def animated(
 
     async def fill(folder: Path) -> Callable[[BinaryIO], None]:
         pictures = _Spooled(folder / "pictures", cell)
-        await pictures.fill(batch, steps)
+        await pictures.fill(batch, steps, view)
 
         def write(file: BinaryIO) -> None:
             made = folder / "animation"
@@ -157,7 +166,7 @@ async def animated(
 
         return write
 
-    return await _made(request, batch, ("animation", format, fps, width), steps, MIME[format], 3 * pixels, fill)
+    return await _made(request, batch, ("animation", format, fps, width, view), steps, MIME[format], 3 * pixels, fill)
 
 
 async def _made(
@@ -195,9 +204,9 @@ class _Spooled:
     def __init__(self, path: Path, size: tuple[int, int]) -> None:
         self._path, self._size, self._count = path, size, 0
 
-    async def fill(self, batch: Batch, steps: Sequence[int]) -> None:
+    async def fill(self, batch: Batch, steps: Sequence[int], view: View) -> None:
         for step in steps:
-            pixels, _ = await batch.jobs[step].image(DISPLAY)
+            pixels, _ = await batch.jobs[step].image(view)
             await writing(partial(self._append, pixels))
 
     def _append(self, pixels: np.ndarray) -> None:

@@ -16,6 +16,7 @@ from service.batches.batch import Batch
 from service.config import MIB
 from service.images import animation
 from service.images.animation import AnimationFormat
+from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, TooLarge
 from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import IdempotencyKey
@@ -25,6 +26,7 @@ from service.routes.errors import GONE
 from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["batches"])
 
@@ -34,14 +36,23 @@ BatchId = Annotated[str, Path(description="As the answer to the batch's start ha
 Width = Annotated[int | None, Field(ge=1, description="Pixels of one picture, which is scaled down, never up.")]
 
 
-class SheetQuery(BaseModel):
+class Shown(BaseModel):
+    """How pictures are shown."""
+
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
+    tone_map: ToneMap = DEFAULT_TONE_MAP
+
+    def view(self) -> View:
+        return View("color", self.exposure, self.tone_map, "u1")
+
+
+class SheetQuery(Shown):
     format: batch_files.SheetFormat = "png"
     width: Width = None
 
 
-class AnimationQuery(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+class AnimationQuery(Shown):
     format: AnimationFormat = "apng"
     fps: Annotated[float, Field(gt=0, le=120, description="Pictures a second.")] = 24.0
     width: Width = None
@@ -159,7 +170,7 @@ async def images_zip(request: Request, id: BatchId, query: Annotated[ImageQuery,
 )
 async def sheet(request: Request, id: BatchId, query: Annotated[SheetQuery, Query()]) -> Response:
     batch = app_state(request).batches.get(id, owner_of(request))
-    return await batch_files.sheet(request, batch, query.format, query.width, _pictured(batch))
+    return await batch_files.sheet(request, batch, query.format, query.width, query.view(), _pictured(batch))
 
 
 @router.get(
@@ -171,8 +182,8 @@ async def sheet(request: Request, id: BatchId, query: Annotated[SheetQuery, Quer
 )
 async def animated(request: Request, id: BatchId, query: Annotated[AnimationQuery, Query()]) -> Response:
     batch = app_state(request).batches.get(id, owner_of(request))
-    steps = _pictured(batch)
-    return await batch_files.animated(request, batch, query.format, query.fps, query.width, steps)
+    steps, view = _pictured(batch), query.view()
+    return await batch_files.animated(request, batch, query.format, query.fps, query.width, view, steps)
 
 
 def _pictured(batch: Batch) -> list[int]:

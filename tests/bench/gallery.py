@@ -1,7 +1,6 @@
 """The README's pictures, rendered again: `python -m tests.bench gallery DATA [NAME ...]`.
 
-DATA is a folder with `mesh/stanford-bunny.obj` (Stanford Computer Graphics Laboratory) and `hdri/studio.exr`
-(Poly Haven, CC0). Pictures go to web/gallery. Their scenes are here or among the presets.
+DATA has `hdri/studio.exr` (Poly Haven, CC0). Pictures go to web/gallery; their scenes are here or presets.
 """
 
 from __future__ import annotations
@@ -23,30 +22,6 @@ if TYPE_CHECKING:
 
 OUT = Path(__file__).resolve().parents[2] / "web" / "gallery"
 STUDIO = {"type": "image", "asset": "hdri/studio.exr", "background": False}
-
-
-def bunny() -> dict[str, Any]:
-    """The Stanford bunny, glazed, on a plane under a studio's lamps."""
-    place = {"translate": [0.4, -0.99, 0], "scale": 30}
-    return {
-        "version": 1,
-        "camera": {"position": [1.2, 2.6, 8.2], "target": [0, 1.95, 0], "vfov": 36},
-        "environment": {**STUDIO, "rotation": 200, "background": True},
-        "materials": {
-            "glaze": {"type": "disney", "base_color": "#2f6f73", "roughness": 0.35, "clearcoat": 1, "specular": 0.6},
-            "table": {"type": "disney", "base_color": "#b9a58c", "roughness": 0.7, "specular": 0.3},
-        },
-        "shapes": [
-            {
-                "type": "mesh",
-                "asset": "mesh/stanford-bunny.obj",
-                "smooth": True,
-                "material": "glaze",
-                "transform": place,
-            },
-            {"type": "quad", "origin": [-40, 0, 40], "u": [80, 0, 0], "v": [0, 0, -80], "material": "table"},
-        ],
-    }
 
 
 def roughness() -> dict[str, Any]:
@@ -97,7 +72,6 @@ def preset(name: str) -> Callable[[], dict[str, Any]]:
 
 PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], float]] = {
     # scene, (width, height, samples), exposure
-    "bunny": (bunny, (800, 600, 192), -1.6),
     "roughness": (roughness, (1200, 280, 512), -0.5),
     "materials": (materials, (800, 440, 300), 0.0),
     "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
@@ -119,7 +93,7 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
          ("click", "#lobe >> text=By lobe", "")],
     ),
     "editor-scene": ((1280, 800), "light", [
-        ("click", "#outline-list [data-thing='/environment']", ""), ("key", "h", ""), ("key", "4", ""),
+        ("click", "#outline-list [data-thing='/environment']", ""), ("key", "h", ""), ("key", "7", ""),
     ]),
     "editor-render": (
         (1280, 800), "light",
@@ -132,6 +106,7 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
         [("fill", "#panel [data-field=roughness] input.number", "7"), ("lose", "", "")],
     ),
 }  # fmt: skip
+FIRST_SCENE = ("editor", "editor-phone")
 LOST = "text=The connection to the server was lost"
 
 
@@ -155,7 +130,8 @@ def _photograph(
     for name in names:
         (width, height), scheme, acts = STATES[name]
         page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
-        page.goto(f"http://127.0.0.1:{port}/")
+        # The first scene, where all of the page is shown; a quicker one, where a part of it is.
+        page.goto(f"http://127.0.0.1:{port}/{'' if name in FIRST_SCENE else '#scene=sphere-on-floor'}")
         page.wait_for_selector("#stage.live")
         for act, what, value in acts:
             if act == "key":
@@ -173,7 +149,7 @@ def _photograph(
                 wait_s = 0.5  # before it is tried again
             else:
                 page.select_option(what, value)
-        page.wait_for_timeout(1000 * wait_s)
+        page.wait_for_timeout(1000 * wait_s * (4 if name in FIRST_SCENE else 1))
         page.screenshot(path=OUT / f"{name}.png")
         page.close()
     browser.close()

@@ -79,7 +79,7 @@ def test_sheet(server: Server, done: Any) -> None:
     sheet = Image.open(io.BytesIO(file(server, done, "sheet")))
     small = Image.open(io.BytesIO(file(server, done, "sheet?format=webp&width=16")))
     assert sheet.format == "PNG" and sheet.width > 3 * 32 and sheet.height > 2 * 24 and small.width < sheet.width
-    assert file(server, done, "sheet") == file(server, done, "sheet")
+    assert file(server, done, "sheet") == file(server, done, "sheet") != file(server, done, "sheet?exposure=2")
 
 
 @pytest.mark.parametrize("format", ["apng", "webp", "gif", "avif"])

@@ -58,26 +58,27 @@ class AsyncBatch:
                     seen.add(place)
                     yield place, await self._picture(each)
 
-    async def sheet(self, format: str = "png", width: int | None = None) -> bytes:
-        """A contact sheet of what there is: png, jpeg or webp; each picture at most `width` pixels wide."""
-        return await self._file("sheet", format=format, width=width)
+    async def sheet(self, format: str = "png", width: int | None = None, **view: Any) -> bytes:
+        """A contact sheet of what there is: png, jpeg or webp; each picture at most `width` pixels wide. `view`:
+        exposure, tone_map."""
+        return await self._file("sheet", format=format, width=width, **view)
 
-    async def animation(self, format: str = "apng", fps: float = 24, width: int | None = None) -> bytes:
+    async def animation(self, format: str = "apng", fps: float = 24, width: int | None = None, **view: Any) -> bytes:
         """What there is, one after the other: apng, webp, gif, avif, or mp4 where the server has ffmpeg."""
-        return await self._file("animation", format=format, fps=fps, width=width)
+        return await self._file("animation", format=format, fps=fps, width=width, **view)
 
     async def zip(self, format: str = "png", **view: Any) -> bytes:
         """A zip of all pictures that there are; `view` as of a picture's `save`."""
         return await self._file("images.zip", format=format, **view)
 
-    async def save_sheet(self, path: str | Path, width: int | None = None) -> None:
+    async def save_sheet(self, path: str | Path, width: int | None = None, **view: Any) -> None:
         """The contact sheet in the format of the path's ending. Raises ValueError, OSError."""
-        data = await self.sheet(_format(path, SHEETS), width)
+        data = await self.sheet(_format(path, SHEETS), width, **view)
         await asyncio.to_thread(Path(path).write_bytes, data)
 
-    async def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None) -> None:
+    async def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None, **view: Any) -> None:
         """The animation in the format of the path's ending; .png is an APNG. Raises ValueError, OSError."""
-        data = await self.animation(_format(path, ANIMATIONS), fps, width)
+        data = await self.animation(_format(path, ANIMATIONS), fps, width, **view)
         await asyncio.to_thread(Path(path).write_bytes, data)
 
     async def cancel(self) -> None:

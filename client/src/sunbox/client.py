@@ -197,25 +197,25 @@ class Batch:
         for place, picture in _each(self._batch.as_completed()):
             yield place, Picture(picture)
 
-    def sheet(self, format: str = "png", width: int | None = None) -> bytes:
+    def sheet(self, format: str = "png", width: int | None = None, **view: Any) -> bytes:
         """A contact sheet of what there is: png, jpeg or webp."""
-        return run(self._batch.sheet(format, width))
+        return run(self._batch.sheet(format, width, **view))
 
-    def animation(self, format: str = "apng", fps: float = 24, width: int | None = None) -> bytes:
+    def animation(self, format: str = "apng", fps: float = 24, width: int | None = None, **view: Any) -> bytes:
         """What there is, one after the other: apng, webp, gif, avif or mp4."""
-        return run(self._batch.animation(format, fps, width))
+        return run(self._batch.animation(format, fps, width, **view))
 
     def zip(self, format: str = "png", **view: Any) -> bytes:
         """A zip of all pictures that there are."""
         return run(self._batch.zip(format, **view))
 
-    def save_sheet(self, path: str | Path, width: int | None = None) -> None:
+    def save_sheet(self, path: str | Path, width: int | None = None, **view: Any) -> None:
         """The contact sheet in the format of the path's ending."""
-        run(self._batch.save_sheet(path, width))
+        run(self._batch.save_sheet(path, width, **view))
 
-    def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None) -> None:
+    def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None, **view: Any) -> None:
         """The animation in the format of the path's ending; .png is an APNG."""
-        run(self._batch.save_animation(path, fps, width))
+        run(self._batch.save_animation(path, fps, width, **view))
 
     def cancel(self) -> None:
         """Ends it; the pictures so far stay."""
