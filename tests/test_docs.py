@@ -1,4 +1,4 @@
-"""The pages that people read: their links lead somewhere, and everything that is shipped is named in the notices."""
+"""The pages that people read: links lead somewhere, all that is shipped is in the notices, modules are preloaded."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ PAGES = [
     ROOT / "shaders" / "README.md",
     *(ROOT / "docs").glob("*.md"),
 ]
+STATIC = re.compile(r"""^(?:import|export)\b[^;"]*?"(\.{1,2}/[^"]+)";""", re.M)  # an import of a module
 LINK = re.compile(r"\]\(([^)#\s]+)|src=\"([^\"]+)\"")
 
 
@@ -35,3 +36,18 @@ def test_every_shipped_package_is_in_the_notices() -> None:
 
 def _normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def test_the_page_preloads_the_modules_that_it_begins_with() -> None:
+    """Else a browser asks for the imports of a module when it has that: one depth after the other."""
+    web = ROOT / "web"
+    needed: set[str] = set()
+    found = {"main.js"}
+    while found:
+        needed |= found
+        reached = ((web / path).parent / each for path in found for each in STATIC.findall((web / path).read_text()))
+        found = {str(path.resolve().relative_to(web)) for path in reached} - needed
+    listed = re.findall(r'<link rel="modulepreload" href="([^"]+)">', (web / "index.html").read_text())
+    expected = sorted(needed - {"main.js"})
+    lines = "\n".join(f'  <link rel="modulepreload" href="{path}">' for path in expected)
+    assert listed == expected, f"the list in web/index.html has to be:\n{lines}"

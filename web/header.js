@@ -16,7 +16,6 @@ export function makeHeader({
   stream,
   recipes,
   messages,
-  hasDocuments,
   titleOf,
   openFiles,
   addFiles,
@@ -25,7 +24,6 @@ export function makeHeader({
 }) {
   const tellOf = (title, below) => messages.show("share", { title, below });
   const sceneMenu = new SceneMenu(find("page-save"), {
-    hasDocuments,
     acts: {
       scene: () => editor.state.scene,
       title: () => titleOf(editor.state.chosen),

@@ -13,7 +13,7 @@ import { makeHeader } from "./header.js";
 import { askForKey } from "./server/key.js";
 import { FinalPictures } from "./renders/final-pictures.js";
 import { fillSheet, watchKeys } from "./keys.js";
-import { LobePanel } from "./lobe/panel.js";
+import { LobeOnDemand } from "./lobe/on-demand.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
 import { entire, visible } from "./document/outline.js";
@@ -61,7 +61,7 @@ const complain = (problem) => {
 };
 
 let editor = null;
-const { schema, library, calls, name, scene, left } = await boot({
+const { schema, library, name, scene, left } = await boot({
   keyDialog: find("key-dialog"),
   complain,
   told(problem) {
@@ -220,10 +220,7 @@ const frame = new Frame(find, ui);
 
 // --- the shelf ---
 
-const hasDocuments = Object.keys(calls).some((path) => path.startsWith("/v1/documents"));
-const saved = hasDocuments
-  ? new SavedMaterials({ acts: editor, say, changed: (name) => shelf?.refresh(name) })
-  : null;
+const saved = new SavedMaterials({ acts: editor, say, changed: (name) => shelf?.refresh(name) });
 const shelf = new Shelf(find, {
   library,
   acts: editor,
@@ -239,7 +236,6 @@ const shelf = new Shelf(find, {
   rename: (material) => panel.materialPanel.rename(material),
   remove: (material) => panel.materialPanel.remove(material),
 });
-find("save-material").hidden = !saved;
 find("save-material").addEventListener("click", () => saved.save());
 
 const { sceneMenu, exportMenu } = makeHeader({
@@ -249,7 +245,6 @@ const { sceneMenu, exportMenu } = makeHeader({
   stream,
   recipes,
   messages,
-  hasDocuments,
   titleOf,
   openFiles: () => commands.does.openFiles(),
   addFiles: () => commands.does.addFiles(),
@@ -257,15 +252,14 @@ const { sceneMenu, exportMenu } = makeHeader({
   say,
 });
 
-const lobe = new LobePanel(find("lobe"), {
+const lobe = new LobeOnDemand(find("lobe"), {
   acts: editor,
   schema,
-  calls,
   titles,
   mean: (texture, reads) => textureThumbnails.mean(texture, reads),
   close: () => ui.set({ lobe: false }),
+  complain,
 });
-find("show-lobe").hidden = !lobe.isPossible;
 for (const near of ["pointerenter", "focus"]) find("show-lobe").addEventListener(near, () => lobe.prepare());
 
 const finals = new FinalPictures({
@@ -355,7 +349,7 @@ function refresh() {
 function showUi() {
   display.show();
   frame.show();
-  find("lobe").hidden = !ui.state.lobe || !lobe.isPossible;
+  find("lobe").hidden = !ui.state.lobe;
   find("show-lobe").setAttribute("aria-pressed", String(ui.state.lobe));
   lobe.refresh();
   controller.showUi(ui.state);

@@ -26,6 +26,12 @@ export function staged(scene, document) {
 
 const beside = (name) => new URL(`thumbnails/${name}`, document.baseURI);
 
+// Those in shut drawers, or beyond a list's edge, wait until somebody looks.
+function fetchWhenSeen(image, name) {
+  image.loading = "lazy";
+  image.src = beside(name).href;
+}
+
 const hash = async (document) => {
   const digest = await crypto.subtle.digest("SHA-256", new TextEncoder().encode(JSON.stringify(document)));
   return [...new Uint8Array(digest.slice(0, 12))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
@@ -69,13 +75,13 @@ export class Thumbnails {
 
   // The picture of a material preset, or of what `get` gives where there is none.
   async preset(image, name, get) {
-    if (await this.#has("materials", name)) image.src = beside(`${encodeURIComponent(name)}.webp`).href;
+    if (await this.#has("materials", name)) fetchWhenSeen(image, `${encodeURIComponent(name)}.webp`);
     else this.#queue.push({ image, get });
   }
 
   // The picture of a scene or an environment, of which only presets have one.
   async place(image, kind, name) {
-    if (await this.#has(kind, name)) image.src = beside(`${kind}/${encodeURIComponent(name)}.webp`).href;
+    if (await this.#has(kind, name)) fetchWhenSeen(image, `${kind}/${encodeURIComponent(name)}.webp`);
   }
 
   // A plain ball of a colour.

@@ -49,19 +49,15 @@ export class LobePanel {
   #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
-  // `root` is the panel's element; `acts` the editor; `calls` the server's paths; `mean(texture, reads)` resolves to
+  // `root` is the panel's element; `acts` the editor; `mean(texture, reads)` resolves to
   // a texture's mean; `close()` hides the panel.
-  constructor(root, { acts, schema, calls, mean, titles, close }) {
+  constructor(root, { acts, schema, mean, titles, close }) {
     Object.assign(this, { root, acts, mean, titles });
     this.models = materialModels(schema.scene);
     this.schema = schema.scene;
-    this.views = Object.keys(VIEWS).filter((name) => VIEWS[name].needs in calls);
+    this.views = Object.keys(VIEWS);
     this.#build(close);
     new ResizeObserver(() => this.#draw()).observe(this.plot);
-  }
-
-  get isPossible() {
-    return this.views.length > 0;
   }
 
   get #view() {
@@ -258,7 +254,7 @@ export class LobePanel {
 
   // Shows the state of the editor; asks the server where that needs numbers that are not here.
   refresh() {
-    if (this.root.hidden || !this.isPossible) return;
+    if (this.root.hidden) return;
     const { view, incidence, isLog, channels, byLobe } = this.#options;
     if (!this.#shown) this.table.element.open = this.root.clientHeight > ROOMY;
     const { materials, replaced } = this.#materials();
@@ -337,7 +333,7 @@ export class LobePanel {
 
   // Before the panel opens, as a hand comes near its button: the kernel of its first plot is compiled meanwhile.
   prepare() {
-    if (!this.root.hidden || !this.isPossible) return;
+    if (!this.root.hidden) return;
     this.#warming.begin([{ material: this.#materials().materials.a, needs: this.#view.needs }], 0);
   }
 

@@ -14,7 +14,7 @@ const button = (label, does, more = {}) =>
 export class SceneMenu {
   // `acts` has scene(), title(), open(document, title), named(title), state(), snapshot() -> {blob, note},
   // restore(essence), openFiles(), addFiles(), complain(error), announce(text).
-  constructor(root, { acts, hasDocuments }) {
+  constructor(root, { acts }) {
     this.acts = acts;
     const files = element(
       "div",
@@ -29,7 +29,7 @@ export class SceneMenu {
       }),
     );
     root.replaceChildren(
-      ...(hasDocuments ? [this.#saved()] : []),
+      this.#saved(),
       this.#group(
         "Files",
         files,
@@ -41,9 +41,9 @@ export class SceneMenu {
 
   // Call before it is shown.
   refresh() {
-    if (this.name && document.activeElement !== this.name) this.name.value = this.acts.title();
+    if (document.activeElement !== this.name) this.name.value = this.acts.title();
     this.refreshSnapshots();
-    if (this.list) this.refreshSaved();
+    this.refreshSaved();
   }
 
   async #try(work) {

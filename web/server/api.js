@@ -40,7 +40,6 @@ const json = (document) => ({ body: JSON.stringify(document), headers: { "conten
 const get = async (path) => (await ask("GET", path)).json();
 
 export const fetchSchema = () => get("schema");
-export const fetchApi = async () => (await fetch(new URL("openapi.json", document.baseURI))).json();
 export const listPresets = (kind) => get(`presets/${kind}`);
 export const fetchPreset = (kind, name) => get(`presets/${kind}/${encodeURIComponent(name)}`);
 
