@@ -148,14 +148,14 @@ def test_a_size_is_found_by_its_name_and_keeps_a_shape(page: Page) -> None:
 
     here = {"width": 900, "height": 700}
     assert sizes("sizeOf", "4k", here) == {"width": 3840, "height": 2160}
-    assert sizes("sizeOf", "window", here) is None
+    assert sizes("sizeOf", "window", here, {"width": 5, "height": 4}) == {"width": 5, "height": 4}
     assert sizes("withSide", "custom", here, "width", 64) == {"width": 64, "height": 700}
     assert sizes("withSide", "2:3", here, "width", 64) == {"width": 64, "height": 96}
     assert sizes("withSide", "2:3", here, "height", 96) == {"width": 64, "height": 96}
     assert sizes("choiceOf", {"width": 1080, "height": 1920}, "custom") == "story"
     assert sizes("choiceOf", {"width": 64, "height": 96}, "2:3") == "2:3"
     assert sizes("choiceOf", {"width": 65, "height": 90}, "2:3") == "custom"
-    assert sizes("choiceOf", None, "hd") == "window"
+    assert sizes("choiceOf", here, "window", here) == "window" and sizes("choiceOf", here, "hd", here) == "custom"
 
 
 def test_a_bar_never_goes_back_and_the_time_left_does_not_jump(page: Page) -> None:

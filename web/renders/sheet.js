@@ -6,12 +6,12 @@ import { schemaForm } from "../forms/schema-form.js";
 import { priceOf, qualityWords, wordOf } from "../forms/quality.js";
 import { detailWords } from "../server/problem-text.js";
 import { fields } from "../server/schema.js";
-import { CUSTOM, SHAPES, SIZES, WINDOW, choiceOf, sizeOf, times, withSide } from "./sizes.js";
+import { CUSTOM, SHAPES, SIZES, STANDARD, WINDOW, choiceOf, sizeOf, times, withSide } from "./sizes.js";
 
 const SIDES = ["width", "height"];
 
 export class RenderSheet {
-  #choice = WINDOW;
+  #choice = STANDARD;
   #settings = {};
   #screen = { width: 1, height: 1 };
 
@@ -24,11 +24,11 @@ export class RenderSheet {
     this.picker = element(
       "select",
       { id, onchange: () => this.#choose(this.picker.value) },
-      option(WINDOW, "As the window"),
       ...Object.entries(SIZES).map(([name, { title, width, height }]) =>
         option(name, `${title}, ${times(width, height)}`),
       ),
       ...SHAPES.map((shape) => option(shape, `Shape ${shape.replace(":", " : ")}`)),
+      option(WINDOW, "As the window"),
       option(CUSTOM, "Custom"),
     );
     this.form = schemaForm(
@@ -56,7 +56,7 @@ export class RenderSheet {
     );
   }
 
-  // Null is the window's.
+  // Null is the standard size, which leaves the picture on screen as wide as its window.
   #put(size) {
     const { width: _, height: __, ...settings } = this.#settings;
     this.acts.change({ settings: size ? { ...settings, ...size } : settings }, "size");
@@ -65,7 +65,7 @@ export class RenderSheet {
   #choose(choice) {
     this.acts.forgive();
     this.#choice = choice;
-    this.#put(sizeOf(choice, this.size));
+    this.#put(sizeOf(choice, this.size, this.#screen));
     this.acts.rest();
   }
 
@@ -84,17 +84,18 @@ export class RenderSheet {
 
   // `screen`: the size of the picture on screen; `presets` with what they cost; `live`: the header of its newest frame.
   show(settings, { screen, presets, live, limits }) {
-    [this.#settings, this.#screen] = [settings, screen];
-    const { width, height } = settings;
-    const given = width && height ? { width, height } : null;
-    this.size = given ?? { width: screen.width, height: screen.height };
-    this.#choice = choiceOf(given, this.#choice);
+    [this.#settings, this.#screen] = [settings, { width: screen.width, height: screen.height }];
+    const standard = SIZES[STANDARD];
+    const fallback = standard.width * standard.height > limits.max_pixels ? this.#screen : standard;
+    const { width = fallback.width, height = fallback.height } = settings;
+    this.size = { width, height };
+    this.#choice = choiceOf(this.size, this.#choice, this.#screen);
     this.picker.value = this.#choice;
     for (const option of this.picker.options) {
       const named = SIZES[option.value];
       option.disabled = Boolean(named) && named.width * named.height > limits.max_pixels;
     }
-    this.form.show(settings, screen);
+    this.form.show(settings, this.size);
     const known = this.schema.settings.properties.quality.default;
     const { quality = known, max_samples, target_noise, time_limit } = settings;
     const isOwn = Boolean(max_samples || target_noise || time_limit);

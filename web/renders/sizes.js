@@ -17,9 +17,11 @@ const ratioOf = (shape) => shape.split(":").reduce((a, b) => Number(a) / Number(
 const across = (shape, height) => Math.max(1, Math.round(height * ratioOf(shape)));
 const down = (shape, width) => Math.max(1, Math.round(width / ratioOf(shape)));
 
-// The size that a choice stands for, beside the one that is there; null is the window's.
-export function sizeOf(choice, present) {
-  if (choice === WINDOW) return null;
+export const STANDARD = "hd"; // unless somebody says otherwise
+
+// The size that a choice stands for, beside the one that is there and that of the window.
+export function sizeOf(choice, present, screen) {
+  if (choice === WINDOW) return screen;
   if (SIZES[choice]) return { width: SIZES[choice].width, height: SIZES[choice].height };
   if (SHAPES.includes(choice)) return { width: present.width, height: down(choice, present.width) };
   return present;
@@ -32,10 +34,10 @@ export function withSide(choice, present, name, value) {
   return name === "width" ? { ...size, height: down(choice, value) } : { ...size, width: across(choice, value) };
 }
 
-// What a size, or null for the window's, is called: a shape stays chosen while the size has its proportions.
-export function choiceOf(size, chosen) {
-  if (!size) return WINDOW;
+// What a size is called: a shape stays chosen while the size has its proportions, the window's while it has its size.
+export function choiceOf(size, chosen, screen) {
   const { width, height } = size;
+  if (chosen === WINDOW && width === screen?.width && height === screen?.height) return WINDOW;
   if (SHAPES.includes(chosen) && (height === down(chosen, width) || width === across(chosen, height))) return chosen;
   const named = Object.entries(SIZES).find(([, each]) => each.width === width && each.height === height);
   return named?.[0] ?? CUSTOM;
