@@ -97,10 +97,17 @@ def test_narrow_bars_clip_no_word(at: Editor) -> None:
             document.getElementById(id).textContent = text;
         }
     }"""
+    preview = """(isShown) => {
+        const shown = document.getElementById("preview");
+        shown.hidden = !isShown;
+        shown.textContent = "1/16 size";
+    }"""
     page.click("#pause")
     at.wait("a pause", lambda: at.text("#state") == "Paused")
     page.evaluate(longest)
-    assert page.evaluate(past) == []
+    for is_preview in (True, False):
+        page.evaluate(preview, is_preview)
+        assert page.evaluate(past) == [], f"a preview: {is_preview}"
     page.click("#pause")
     page.click("#compare")
     label = ".variant.b"
