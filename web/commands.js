@@ -135,6 +135,7 @@ const TOOLS = {
   fly: "look around",
   focus: "focus by clicking",
   inspect: "zoom to pixels; arrows move the cross",
+  highlight: "click where the chosen light, or the environment, has to be mirrored",
 };
 
 // The keys of the commands and the words of the sheet that explains them: [{keys, shift, ctrl, does, says, group}].

@@ -143,6 +143,20 @@ export function targetOf(scene, document, camera) {
 
 const POLE = radians(88); // above and below, where a light would turn on the spot
 
+// The light turned about the vertical, and then up or down, so that `arm`, from the target to it, points along another one.
+export function swung(document, target, arm, to) {
+  const level = ([x, , z]) => (Math.hypot(x, z) > 1e-6 * length(to) ? [x, 0, z] : null);
+  const [before, after] = [level(arm), level(to) ?? level(arm) ?? [0, 0, 1]];
+  const heading = ([x, , z]) => Math.atan2(x, z);
+  const yaw = before ? heading(after) - heading(before) : 0;
+  const above = (v) => Math.asin(Math.min(1, Math.max(-1, v[1] / length(v))));
+  const side = normalize(cross(after, [0, 1, 0]));
+  const map = (v) => turn(turn(v, [0, 1, 0], yaw), side, above(to) - above(arm));
+  // A ball that nothing was done to goes along as it is: no side of it is the front.
+  if (document.type === "sphere" && !document.transform) return shifted(document, subtract(map(arm), arm));
+  return mapped(document, map, target);
+}
+
 // The light slid round a target by angles in radians, as the camera sees them: to the right and up.
 export function slid(document, target, camera, right, up) {
   const { forward, right: aside } = axes(camera);
@@ -154,10 +168,7 @@ export function slid(document, target, camera, right, up) {
   const side = length(level) > 1e-6 * length(turned) ? normalize(level) : aside;
   const now = Math.asin(Math.min(1, Math.max(-1, turned[1] / length(turned))));
   const lift = Math.min(Math.max(now + up, -POLE), POLE) - now;
-  const map = (v) => turn(turn(v, [0, 1, 0], yaw), side, lift);
-  // A ball that nothing was done to goes along as it is: no side of it is the front.
-  if (document.type === "sphere" && !document.transform) return shifted(document, subtract(map(arm), arm));
-  return mapped(document, map, target);
+  return swung(document, target, arm, turn(turned, side, lift));
 }
 
 // The light at another distance from the target, as large as before.

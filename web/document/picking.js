@@ -41,20 +41,26 @@ export class Picker {
     this.#layers.clear();
   }
 
-  async #value(aov, scene, { x, y }) {
+  async #values(aov, scene, { x, y }) {
     const { floats, width, height } = await this.layer(aov, scene);
-    return floats[4 * (Math.floor(y * height) * width + Math.floor(x * width))];
+    const at = 4 * (Math.floor(y * height) * width + Math.floor(x * width));
+    return [...floats.subarray(at, at + 3)];
   }
 
   // The index of the shape there, or null.
   async shape(scene, place) {
-    const id = Math.round(await this.#value("shape_id", scene, place));
+    const id = Math.round((await this.#values("shape_id", scene, place))[0]);
     return id > 0 ? id - 1 : null;
   }
 
   // Along the ray, in metres; 0 where nothing is.
-  depth(scene, place) {
-    return this.#value("depth", scene, place);
+  async depth(scene, place) {
+    return (await this.#values("depth", scene, place))[0];
+  }
+
+  // The mean normal of what is seen there, of whatever length.
+  normal(scene, place) {
+    return this.#values("normal", scene, place);
   }
 
   // What can be seen of each shape: lists of points, by its index.

@@ -15,8 +15,8 @@ const middle = (points) => ({
 });
 
 // `move` has orbit(right, down), look(right, down), pan(right, down), zoom(factor, x, y), turn(right) of the
-// environment, slide(right, down) of the magnified picture, tap(x, y), hover(x, y) and `rest()` after each gesture.
-// `tool()` is the one in the hand: orbit, fly, focus or inspect.
+// environment, slide(right, down) of the magnified picture, tap(x, y, isAlt), hover(x, y) and `rest()` after each gesture.
+// `tool()` is the one in the hand: orbit, fly, focus, inspect, ...
 export function watchGestures(stage, move, tool) {
   const fingers = new Map();
   let last = null;
@@ -71,7 +71,7 @@ export function watchGestures(stage, move, tool) {
     last = fingers.size ? middle([...fingers.values()]) : null;
     if (fingers.size) return;
     stage.classList.remove("held");
-    if (began && event.type === "pointerup") move.tap(event.clientX, event.clientY);
+    if (began && event.type === "pointerup") move.tap(event.clientX, event.clientY, event.altKey);
     else move.rest();
     began = null;
   };

@@ -5,6 +5,7 @@ import { axes, frame, ray } from "../document/camera.js";
 import { lampsOf } from "../document/lamps.js";
 import { watchGestures } from "./gestures.js";
 import { HANDLED, Handles } from "./handles.js";
+import { placeHighlight } from "./highlight-tool.js";
 import { Inspector } from "./inspector.js";
 import { irradianceFor } from "./light-there.js";
 import { Markers } from "./markers.js";
@@ -20,6 +21,7 @@ import { inWords } from "../lib/format-text.js";
 // A click before there is a picture.
 const EARLY = {
   focus: "Nothing can be focused on yet: the picture is still being prepared. Click again once it is there.",
+  highlight: "Nothing can be mirrored yet: the picture is still being prepared. Click again once it is there.",
   select: "Nothing can be selected in the picture yet: it is still being prepared. The outline has everything.",
 };
 
@@ -58,7 +60,7 @@ export class ViewportController {
       hover: (x, y) => {
         if (this.inspector.active) this.inspector.hover(x, y);
       },
-      tap: (x, y) => this.tap(x, y),
+      tap: (x, y, isAlt) => this.tap(x, y, isAlt),
     };
     // The arrows move the cross, or change the selection, where that is the tool.
     const stepped = (steps, orElse) => (right, down) => {
@@ -147,15 +149,16 @@ export class ViewportController {
     );
   }
 
-  async tap(x, y) {
+  async tap(x, y, isAlt) {
     const place = this.viewport.place(x, y);
     const { tool } = this.ui.state;
     if (!place || tool === "inspect") return;
     try {
-      if (tool === "focus") await this.focus(place);
+      if (isAlt || tool === "highlight") await placeHighlight(this, place, this.aspect);
+      else if (tool === "focus") await this.focus(place);
       else await this.select(place);
     } catch (error) {
-      this.complain(error instanceof NotReady ? new Error(EARLY[tool === "focus" ? "focus" : "select"]) : error);
+      this.complain(error instanceof NotReady ? new Error(EARLY[isAlt ? "highlight" : tool] ?? EARLY.select) : error);
     }
   }
 

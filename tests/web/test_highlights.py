@@ -1,0 +1,98 @@
+"""A click says where a highlight lies: there the chosen light, or the environment, is mirrored."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.editing import document, point
+
+BALL: dict[str, Any] = {
+    "version": 1,
+    "camera": {"position": [0, 1, 6], "target": [0, 1, 0], "vfov": 30},
+    "materials": {
+        "mirror": {"type": "principled", "base_color": 0.9, "metallic": 1, "roughness": 0.1},
+        "lamp": {"type": "diffuse", "albedo": 0, "emission": 40},
+    },
+    "shapes": [
+        {"type": "sphere", "center": [0, 1, 0], "radius": 1, "material": "mirror"},
+        {"type": "quad", "origin": [-2.65, 4.35, -0.5], "u": [0, 0, 1], "v": [-0.7, -0.7, 0], "material": "lamp"},
+    ],
+}
+SETTINGS = {"width": 96, "height": 96, "max_samples": 16, "max_bounces": 2, "seed": 1}
+
+
+def brightest(server: Server, scene: Any) -> np.ndarray:
+    """Where a square picture is brightest, from its middle: x to the right and y up, in its heights."""
+    body = {"scene": scene, "settings": SETTINGS}
+    answer = httpx.post(f"{server.url}/v1/render?format=npy", json=body, timeout=180).raise_for_status()
+    light = np.load(io.BytesIO(answer.content))[..., :3] @ [0.2126, 0.7152, 0.0722]
+    rows, columns = np.nonzero(light > 0.5 * light.max())
+    return np.array([columns.mean() + 0.5, 96 - rows.mean() - 0.5]) / 96 - 0.5
+
+
+def paste(editor: Editor, scene: Any) -> None:
+    editor.page.evaluate("(text) => { navigator.clipboard.readText = async () => text; }", json.dumps(scene))
+    editor.act("paste-material")
+    count = len(scene["shapes"])
+    editor.outline(shown=True)
+    places = editor.page.locator("#outline-list [data-thing^='/shapes/']")
+    editor.wait("the scene", lambda: places.count() == count)
+    editor.settled()
+
+
+def at(editor: Editor, right: float, up: float) -> tuple[float, float]:
+    """On the page: a place of the picture, from its middle, in its heights."""
+    x, y = point(editor, 0.5, 0.5)
+    box = editor.page.locator("#stage").bounding_box()
+    assert box is not None
+    return x + right * box["height"], y - up * box["height"]
+
+
+def test_a_click_puts_the_chosen_lamp_where_it_is_mirrored(editor: Editor, server: Server) -> None:
+    page = editor.page
+    paste(editor, BALL)
+    page.keyboard.press("8")
+    page.mouse.click(*at(editor, 0.15, 0.1))
+    editor.wait("a word", lambda: "Select a light" in editor.text("#messages"))
+    assert document(editor)["shapes"] == BALL["shapes"]
+
+    page.click("#outline-list [data-thing='/shapes/1']")
+    page.click("#tools [data-tool=highlight]")
+    page.mouse.click(*at(editor, 0.15, 0.1))
+    editor.wait("another place", lambda: document(editor)["shapes"] != BALL["shapes"])
+    moved = document(editor)
+    assert brightest(server, BALL) != pytest.approx([0.15, 0.1], abs=0.1)
+    assert brightest(server, moved) == pytest.approx([0.15, 0.1], abs=0.02)
+    before, after = (
+        np.array(scene["shapes"][1]["origin"]) + (np.array(scene["shapes"][1]["u"]) + scene["shapes"][1]["v"]) / 2
+        for scene in (BALL, moved)
+    )
+    ball = np.array([0, 1, 0])
+    assert np.linalg.norm(after - ball) == pytest.approx(np.linalg.norm(before - ball), rel=1e-4), "on its sphere"
+    page.keyboard.press("Control+z")
+    assert document(editor)["shapes"] == BALL["shapes"], "one step of undo"
+
+
+def test_alt_click_turns_the_environment_to_its_highlight(editor: Editor, server: Server) -> None:
+    page = editor.page
+    sky = {"type": "sky", "sun_elevation": 20, "sun_azimuth": 100, "turbidity": 6}
+    scene = {**BALL, "shapes": BALL["shapes"][:1], "environment": {**sky, "rotation": 10, "background": False}}
+    paste(editor, scene)
+    page.click("#outline-list [data-thing='/environment']")
+    page.keyboard.down("Alt")
+    page.mouse.click(*at(editor, -0.2, 0.05))
+    page.keyboard.up("Alt")
+    editor.wait("a turn", lambda: document(editor)["environment"]["rotation"] != 10)
+    turned = document(editor)
+    assert brightest(server, scene)[0] != pytest.approx(-0.2, abs=0.1)
+    assert brightest(server, turned)[0] == pytest.approx(-0.2, abs=0.03)
+    page.keyboard.press("Control+z")
+    assert document(editor)["environment"]["rotation"] == 10
