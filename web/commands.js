@@ -1,5 +1,7 @@
 // The commands of the buttons and the keys: what each one does, and which keys give it.
 
+import { compared } from "./document/variants.js";
+
 // The copied material: the browser's clipboard where the page may read it, else one of the page's own.
 class Clipboard {
   #own = null;
@@ -50,7 +52,7 @@ export function makeCommands({
   const does = {
     toggle: (member) => ui.set({ [member]: !ui.state[member] }),
     toggleChecker: () => ui.set({ checker: !page.isCheckered }),
-    toggleCompare: () => (editor.state.compare ? editor.stopComparing() : editor.startComparing()),
+    toggleCompare: () => (compared(editor.state) ? editor.stopComparing() : editor.startComparing()),
     togglePause() {
       page.isPaused = !page.isPaused;
       if (page.isPaused) stream.pause();

@@ -26,6 +26,7 @@ import { offerUndo } from "./panels/replaced.js";
 import { SavedMaterials } from "./panels/saved-materials.js";
 import { blackMaterial, materialModels, modelNames } from "./server/schema.js";
 import { essence } from "./document/share.js";
+import { sceneOfB } from "./document/variants.js";
 import { Shelf } from "./panels/shelf.js";
 import { Status } from "./panels/status.js";
 import { Stream } from "./server/stream.js";
@@ -180,7 +181,6 @@ const comparison = new Comparison(
     first: viewport,
     acts: editor,
     models: Object.keys(materialModels(schema.scene)),
-    changed: refresh,
     names: namesOf,
     lost: () => {},
     beside: () => stream.session,
@@ -318,7 +318,7 @@ function tellState() {
 // Tells the streams what is wanted, and the page how things stand.
 function push() {
   if (!page.info) return;
-  const { sceneB } = editor;
+  const sceneB = sceneOfB(editor.state);
   const { wanted } = page;
   comparison.show(sceneB && { ...wanted, scene: visible(sceneB, editor.state.chosen.hidden) }, page.isPaused);
   stream.show(wanted);

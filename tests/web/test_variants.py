@@ -13,6 +13,8 @@ from PIL import Image
 from tests.web.conftest import Editor
 from tests.web.editing import finish, overlay, point
 
+WAY = "#comparison [aria-label=Comparison]"
+
 
 def metric(editor: Editor) -> float:
     """In percent; not a number before there is one."""
@@ -35,7 +37,7 @@ def test_a_b(editor: Editor) -> None:
         editor.page.keyboard.press("ArrowLeft")
     assert "40%" in editor.page.evaluate("getComputedStyle(document.getElementById('picture-b')).clipPath")
 
-    editor.page.click("#comparison [data-value=difference]")
+    editor.page.select_option(WAY, "difference")
     editor.wait("its picture", lambda: overlay(editor, "difference")[..., :3].max() > 60)
     sky, ball = overlay(editor, "difference")[:20, :, :3].mean(), overlay(editor, "difference")[..., :3].mean()
     assert ball > 2 * sky, "only the ball differs"
@@ -46,13 +48,58 @@ def test_a_b(editor: Editor) -> None:
     editor.page.click("#comparison [data-value=a]")
     assert editor.page.input_value("#model") == "principled", "A is as it was"
 
-    editor.page.click("#comparison [data-value=beside]")
+    editor.page.select_option(WAY, "beside")
     half = editor.page.locator("#picture-b").bounding_box()
     assert half is not None and half["x"] > point(editor, 0.49, 0)[0]
     editor.page.click("#comparison >> text=Done")
     assert editor.page.is_hidden("#comparison") and editor.page.is_hidden("#picture-b")
     editor.page.keyboard.press("Control+z")
     assert editor.page.is_visible("#comparison"), "comparing is undone like everything"
+
+
+def test_b_stays_until_it_is_thrown_away(editor: Editor) -> None:
+    page = editor.page
+    editor.settled()
+    page.click("#compare")
+    page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
+    editor.wait("B", lambda: "Diffuse" in editor.text(".variant.b"))
+    page.click("#comparison [data-value=b]")
+    assert page.get_by_role("heading", name="Editing B").is_visible()
+    assert page.input_value("#model") == "diffuse"
+    page.click("#comparison >> text=Done")
+    assert page.is_hidden("#editing") and page.input_value("#model") == "principled"
+    page.click("#compare")
+    assert "Diffuse" in editor.text(".variant.b"), "Done kept it"
+    assert page.get_by_role("heading", name="Editing A").is_visible()
+    page.click("#comparison >> text=Discard B")
+    assert page.is_hidden("#comparison")
+    page.click("#compare")
+    assert "Principled" in editor.text(".variant.b"), "a copy of A"
+
+
+def test_b_is_awaited_in_words_and_a_link_keeps_the_way_of_comparing(editor: Editor) -> None:
+    """The second stream is held up: what is shown then is neither B nor a difference."""
+    page = editor.page
+    editor.settled()
+    page.evaluate("() => { window.WebSocket = class { static OPEN = 1; static CLOSED = 3; send() {} close() {} }; }")
+    page.click("#compare")
+    page.select_option(WAY, "difference")
+    page.select_option("#comparison [aria-label^='How much']", "16")
+    awaited = "B · Principled · waiting for its first frame"
+    assert page.locator(".variant").all_text_contents() == ["Difference ×16", awaited]
+    assert not overlay(editor, "difference").any() and page.is_visible("#difference"), "opaque and empty"
+    page.select_option(WAY, "swipe")
+    assert page.locator(".variant.b").text_content() == awaited
+    assert page.get_by_role("status", name="Verdict").inner_text() == "B is waiting for its first frame"
+    page.select_option(WAY, "difference")
+
+    page.click("#share")
+    editor.wait("the link", lambda: "#v=" in page.input_value(".command"))
+    page.goto(page.input_value(".command"))
+    page.reload()  # another fragment alone loads nothing
+    editor.wait("the difference", lambda: "Principled against" in editor.text(".variant.b"))
+    assert page.input_value(WAY) == "difference"
+    assert editor.text(".variant.a") == "Difference ×16"
 
 
 def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
@@ -69,7 +116,7 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     rmse = 100 * float(np.sqrt(((a - b) ** 2).mean())) / 255
     editor.wait("the measure", lambda: abs(metric(editor) - rmse) < 0.006)
 
-    editor.page.click("#comparison [data-value=difference]")
+    editor.page.select_option(WAY, "difference")
     editor.wait("its picture", lambda: overlay(editor, "difference")[..., :3].max() > 0)
     for gain in (4, 1, 16):
         editor.page.select_option("#comparison [aria-label^='How much']", str(gain))
@@ -77,7 +124,7 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
         editor.wait("the gain", lambda w=wanted: np.array_equal(overlay(editor, "difference")[..., :3], w))
 
     whole = editor.page.evaluate("stage.clientWidth / stage.clientHeight")
-    editor.page.click("#comparison [data-value=beside]")
+    editor.page.select_option(WAY, "beside")
     aspect = "document.getElementById('picture').width / document.getElementById('picture').height"
     editor.wait("half the size", lambda: editor.page.evaluate("picture.width") < 0.9 * a.shape[1])
     assert editor.page.evaluate(aspect) == pytest.approx(whole, rel=0.02), "all of the view stays"

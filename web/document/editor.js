@@ -1,5 +1,6 @@
 // What the hand does, as changes of the state {scene, settings, view, chosen, home, compare}. `chosen` is what
-// the pickers show, `home` the scene as it was picked, `compare` a second variant of one material.
+// the pickers show, `home` the scene as it was picked, `compare` a second variant of one
+// material (variants.js).
 
 import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
@@ -10,6 +11,7 @@ import { carried, missingWords, received, unpacked, withTextures, withdrawn } fr
 import { at, pointer, put } from "../lib/patch.js";
 import { blackMaterial, defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
+import * as variants from "./variants.js";
 import { without } from "./outline.js";
 
 // The shape that the eye goes to: the first which is not flat.
@@ -165,7 +167,8 @@ export class Editor extends Store {
 
   // Where the material in hand is: in the scene, or variant B.
   get materialPlace() {
-    const { chosen, compare } = this.state;
+    const { chosen } = this.state;
+    const { compared: compare } = this;
     const isB = compare?.side === "b" && compare.material === chosen.material;
     return isB ? "/compare/document" : pointer("scene", "materials", chosen.material);
   }
@@ -253,19 +256,24 @@ export class Editor extends Store {
 
   // --- two variants ---
 
-  // B begins as a copy of the material in hand, so that what changes from here on shows.
+  get compared() {
+    return variants.compared(this.state);
+  }
+
   startComparing() {
-    const { chosen, scene } = this.state;
-    this.change({ compare: { material: chosen.material, document: scene.materials[chosen.material], side: "a" } });
+    this.change(variants.begun(this.state));
   }
 
   stopComparing() {
+    this.change(variants.ended(this.state));
+  }
+
+  discardB() {
     this.change({ compare: null });
   }
 
   editSide(side) {
-    const { compare, chosen } = this.state;
-    this.amend({ compare: { ...compare, side }, chosen: { ...chosen, material: compare.material } });
+    this.amend(variants.sided(this.state, side));
   }
 
   // Makes B what A would be as another model.
@@ -274,19 +282,7 @@ export class Editor extends Store {
   }
 
   swapVariants() {
-    const { compare, scene } = this.state;
-    const a = scene.materials[compare.material];
-    this.change({
-      compare: { ...compare, document: a },
-      scene: { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } },
-    });
-  }
-
-  // The scene with variant B in the place of A, or null.
-  get sceneB() {
-    const { scene, compare } = this.state;
-    if (!compare || !scene.materials[compare.material]) return null;
-    return { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } };
+    this.change(variants.swapped(this.state));
   }
 
   // --- things of the scene ---

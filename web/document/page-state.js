@@ -2,6 +2,7 @@
 // it is paused, connected, done; the size and the limit that hold for the next one.
 
 import { visible } from "./outline.js";
+import { sceneOfB } from "./variants.js";
 import { inWords } from "../lib/format-text.js";
 import { defaults } from "../server/schema.js";
 import { DISPLAY, contained, pictureSize, viewOf } from "./picture-view.js";
@@ -64,7 +65,7 @@ export class PageState {
     const { width, height } = this.editor.state.settings;
     const stageBox = this.root.getBoundingClientRect();
     const box = width && height ? contained(stageBox, { width, height }) : stageBox;
-    if (!this.editor.sceneB) return pictureSize(box, window.devicePixelRatio, area);
+    if (!sceneOfB(this.editor.state)) return pictureSize(box, window.devicePixelRatio, area);
     return pictureSize(this.fit(box), window.devicePixelRatio, area / 2); // two variants share what one may cost
   }
 
@@ -78,7 +79,7 @@ export class PageState {
     const view = viewOf({ ...this.ui.state, checkered: this.isCheckered }, this.view, {
       isPaused: this.isPaused,
       quality: PAUSED_QUALITY,
-      isExact: this.editor.sceneB !== null,
+      isExact: sceneOfB(this.editor.state) !== null,
     });
     const { scene, chosen } = this.editor.state;
     return { scene: visible(scene, chosen.hidden), settings: this.settings, view };

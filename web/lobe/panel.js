@@ -217,7 +217,8 @@ export class LobePanel {
 
   // The variants of the selected material without textures: {materials: {a, b?}, replaced}.
   #materials() {
-    const { compare, chosen, scene } = this.acts.state;
+    const { chosen, scene } = this.acts.state;
+    const { compared: compare } = this.acts;
     const isCompared = compare?.material === chosen.material;
     const documents = { a: scene.materials[chosen.material], ...(isCompared ? { b: compare.document } : {}) };
     const replaced = new Set();
@@ -376,7 +377,8 @@ export class LobePanel {
     this.plot.replaceChildren(drawn);
     this.note.textContent = view.note?.(data, options) ?? "";
     this.note.hidden = !this.note.textContent;
-    const { compare, scene, chosen } = this.acts.state;
+    const { scene, chosen } = this.acts.state;
+    const { compared: compare } = this.acts;
     const models = { a: scene.materials[chosen.material]?.type, b: compare?.document.type };
     this.legend.replaceChildren(...legend(view, data, this.#options.channels, models));
     this.colors.row.classList.toggle(

@@ -2,6 +2,7 @@
 // what the hand does into edits; it keeps nothing itself.
 
 import { DISPLAY } from "../document/picture-view.js";
+import { showEditing } from "./editing.js";
 import { fillPicker } from "../forms/library.js";
 import { MaterialPanel } from "./material-panel.js";
 import { ThingPart } from "./thing-part.js";
@@ -83,6 +84,7 @@ export class Panel {
   show(state, knobs) {
     const { settings, view } = state;
     this.#showMaterial();
+    showEditing(this.find, state);
     this.materialPanel.show(state);
     this.thingPart.show(state);
     this.#forms.view.show(view);

@@ -4,12 +4,11 @@ import { element } from "../lib/dom.js";
 import { Stream } from "../server/stream.js";
 import { watchChoice } from "../lib/tabs.js";
 import { Viewport } from "./viewport.js";
-import { inWords } from "../lib/format-text.js";
+import { amount, inWords } from "../lib/format-text.js";
+import { GAINS, MODES, compared, gainOf, modeOf } from "../document/variants.js";
 
-const MODES = { swipe: "Swipe", beside: "Side by side", difference: "Difference" };
 const DIFFERENCE_MS = 250; // between two of them
-const GAINS = [1, 2, 4, 8, 16, 64];
-const USUAL = 4; // an eighth of the range is seen as half of it
+const AWAITED = "waiting for its first frame";
 
 // {rmse, psnr, most} of two pictures of one size, in displayed values of 0..1; paints |a - b| * gain.
 export function difference(a, b, out = null, gain = 1) {
@@ -29,8 +28,6 @@ export function difference(a, b, out = null, gain = 1) {
 }
 
 export class Comparison {
-  mode = "swipe";
-  gain = USUAL;
   #stream = null;
   #viewport = null;
   #header = null;
@@ -38,21 +35,34 @@ export class Comparison {
   #paused = false;
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor;
-  // `changed()` when the picture's size may be another one; `models` those that B can be turned into;
+  // `models` are those that B can be turned into;
   // `beside()` the session of A, `headerOfA()` that of its picture.
-  constructor(places, { first, acts, models, changed, names, lost, beside, headerOfA }) {
-    Object.assign(this, places, { first, acts, changed, names, lost, beside, headerOfA });
+  constructor(places, { first, acts, models, names, lost, beside, headerOfA }) {
+    Object.assign(this, places, { first, acts, names, lost, beside, headerOfA });
     this.#build(models);
     this.divider.addEventListener("input", () => this.#split());
+    // The bar has a strip of its own above the picture.
+    new ResizeObserver(() => {
+      document.documentElement.style.setProperty("--bar", `${this.root.offsetHeight}px`);
+    }).observe(this.root);
+  }
+
+  // {mode, gain, ...}: what is compared and how, or null.
+  get #compared() {
+    return compared(this.acts.state);
+  }
+
+  #choose(members) {
+    this.acts.amend({ compare: { ...this.#compared, ...members } });
   }
 
   #build(models) {
     const radio = (name, title) =>
       element("button", { type: "button", role: "radio", class: "button small", "data-value": name }, title);
-    const modes = element(
-      "div",
-      { class: "cluster", role: "radiogroup", "aria-label": "How the variants are shown" },
-      ...Object.entries(MODES).map((each) => radio(...each)),
+    this.modes = element(
+      "select",
+      { "aria-label": "Comparison", onchange: () => this.#choose({ mode: this.modes.value }) },
+      ...Object.entries(MODES).map(([value, title]) => element("option", { value }, title)),
     );
     const sides = element(
       "div",
@@ -83,26 +93,27 @@ export class Comparison {
       { type: "button", class: "button small close", onclick: () => this.acts.stopComparing() },
       "Done",
     );
+    const discard = element(
+      "button",
+      {
+        type: "button",
+        class: "button small",
+        title: "Throws variant B away; Done keeps it",
+        onclick: () => this.acts.discardB(),
+      },
+      "Discard B",
+    );
     this.gains = element(
       "select",
       {
         "aria-label": "How much the difference is brightened",
-        onchange: () => {
-          this.gain = Number(this.gains.value);
-          this.painted();
-        },
+        onchange: () => this.#choose({ gain: Number(this.gains.value) }),
       },
-      ...GAINS.map((gain) => element("option", { value: String(gain), selected: gain === USUAL }, `×${gain}`)),
+      ...GAINS.map((gain) => element("option", { value: String(gain) }, `×${gain}`)),
     );
-    this.metric = element("span", { class: "metric" });
-    this.root.append(modes, this.gains, sides, turn, swap, close, this.metric);
-    this.markMode = watchChoice(modes, "button", ({ dataset }) => this.pick(dataset.value));
+    this.metric = element("span", { class: "metric", role: "status", "aria-label": "Verdict", "aria-live": "off" });
+    this.root.append(this.modes, this.gains, sides, turn, swap, discard, close, this.metric);
     this.markSide = watchChoice(sides, "button", ({ dataset }) => this.acts.editSide(dataset.value));
-  }
-
-  pick(mode) {
-    this.mode = mode;
-    this.changed();
   }
 
   get isOn() {
@@ -112,7 +123,12 @@ export class Comparison {
   // Where both stand beside each other, each has half the width, and as much less height: all of the view stays.
   fit(box) {
     const width = box.width / 2 - 1;
-    return this.mode === "beside" ? { width, height: (width * box.height) / box.width } : box;
+    const isBeside = this.isShown("beside");
+    return isBeside ? { width, height: (width * box.height) / box.width } : box;
+  }
+
+  isShown(mode) {
+    return this.#compared !== null && modeOf(this.#compared) === mode;
   }
 
   // `wanted` for variant B as Stream.show takes it, or null: no comparison.
@@ -121,14 +137,15 @@ export class Comparison {
     if (!wanted && this.#stream) this.#close();
     const on = wanted !== null;
     this.root.hidden = !on;
-    if (on) this.stage.dataset.compare = this.mode;
+    if (on) this.stage.dataset.compare = modeOf(this.#compared);
     else delete this.stage.dataset.compare;
     this.canvas.hidden = !on;
-    this.divider.hidden = !on || this.mode !== "swipe";
-    this.difference.hidden = this.gains.hidden = !on || this.mode !== "difference";
+    this.divider.hidden = !on || !this.isShown("swipe");
+    this.difference.hidden = this.gains.hidden = !on || !this.isShown("difference");
     if (!on) return;
-    this.markMode(({ dataset }) => dataset.value === this.mode);
-    this.markSide(({ dataset }) => dataset.value === this.acts.state.compare.side);
+    this.modes.value = modeOf(this.#compared);
+    this.gains.value = String(gainOf(this.#compared));
+    this.markSide(({ dataset }) => dataset.value === this.#compared.side);
     if (paused !== this.#paused) {
       this.#paused = paused;
       if (paused) this.#stream.pause();
@@ -136,10 +153,12 @@ export class Comparison {
     }
     this.#split();
     this.#stream.show(wanted);
+    this.#label();
     this.painted();
   }
 
   #open() {
+    for (const each of [this.canvas, this.difference]) each.width = each.height = 1; // nothing of an earlier B is left
     this.#viewport = new Viewport(this.canvas, {
       names: (aov) => this.names(aov, this.#stream.document),
       painted: ({ header }) => {
@@ -174,6 +193,7 @@ export class Comparison {
     this.#viewport.close();
     this.#stream = this.#viewport = this.#header = null;
     this.#paused = false;
+    this.stage.classList.remove("awaiting");
   }
 
   #split() {
@@ -193,40 +213,50 @@ export class Comparison {
     );
   }
 
-  // What the halves are: "A · Principled · 16 samples".
-  #label(headers) {
-    const { compare, scene } = this.acts.state;
-    const types = [scene.materials[compare.material]?.type, compare.document.type];
-    ["a", "b"].forEach((side, i) => {
-      const words = [side.toUpperCase(), types[i] && inWords(types[i]), headers[i] && String(headers[i].samples)];
-      const unit = element(
-        "span",
-        { class: "unit" },
-        headers[i] ? ` sample${headers[i].samples === 1 ? "" : "s"}` : "",
-      );
-      this.stage.querySelector(`.variant.${side}`).replaceChildren(words.filter(Boolean).join(" · "), unit);
-    });
+  // What is seen: of each half "A · Principled · 16 samples", of a difference what of what.
+  #label() {
+    const { scene } = this.acts.state;
+    const { material, document } = this.#compared;
+    const headers = { a: this.headerOfA(), b: this.#header };
+    const types = { a: scene.materials[material]?.type, b: document.type };
+    const names = { a: inWords(types.a ?? ""), b: inWords(types.b ?? "") };
+    const put = (side, words, samples) => {
+      const [number, unit] = samples ? amount(samples, "sample").split(" ") : [];
+      const parts = [...words, number].filter(Boolean).join(" · ");
+      this.stage
+        .querySelector(`.variant.${side}`)
+        .replaceChildren(parts, element("span", { class: "unit" }, unit ? ` ${unit}` : ""));
+    };
+    this.stage.classList.toggle("awaiting", !headers.b);
+    if (this.isShown("difference")) {
+      put("a", [`Difference ×${gainOf(this.#compared)}`]);
+      put("b", headers.b ? [`A ${names.a} against B ${names.b}`] : ["B", names.b, AWAITED]);
+    } else
+      for (const side of ["a", "b"])
+        put(side, [side.toUpperCase(), names[side], !headers[side] && AWAITED], headers[side]?.samples);
+    if (!headers.b) this.metric.replaceChildren(`B is ${AWAITED}`);
   }
 
   #compare() {
     this.#differed = performance.now();
-    if (!this.isOn) return;
+    if (!this.isOn || !this.#compared) return;
+    this.#label();
     const headers = [this.headerOfA(), this.#header];
-    this.#label(headers);
-    // A preview is not the picture: what is measured on it says nothing.
-    if (headers.some((header) => !(header?.scale >= 1))) {
-      this.metric.replaceChildren("RMSE …");
-      return;
-    }
     const [a, b] = [this.first.canvas, this.canvas];
-    if (a.width !== b.width || a.height !== b.height) return;
-    const isShown = this.mode === "difference";
+    const isSame = headers.every(Boolean) && a.width === b.width && a.height === b.height;
+    // A preview is not the picture: what is measured on it says nothing. Its difference is shown all the same.
+    const isMeasured = isSame && headers.every(({ scale }) => scale >= 1);
+    if (!isMeasured) this.metric.replaceChildren("RMSE …");
+    const isShown = this.isShown("difference");
+    if (!isSame || !(isMeasured || isShown)) return;
     const out = isShown ? new ImageData(a.width, a.height) : null;
-    const { rmse, psnr, most } = difference(this.first.pixels(), this.#viewport.pixels(), out, this.gain);
+    const gain = gainOf(this.#compared);
+    const { rmse, psnr, most } = difference(this.first.pixels(), this.#viewport.pixels(), out, gain);
     if (out) {
       Object.assign(this.difference, { width: a.width, height: a.height });
       this.difference.getContext("2d").putImageData(out, 0, 0);
     }
+    if (!isMeasured) return;
     const percent = (x) => `${(100 * x).toFixed(2)} %`;
     const [ofA, ofB] = headers.map(({ samples }) => samples);
     this.metric.replaceChildren(
