@@ -123,6 +123,10 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
         wanted = np.minimum(gain * np.abs(a - b), 255)
         editor.wait("the gain", lambda w=wanted: np.array_equal(overlay(editor, "difference")[..., :3], w))
 
+    editor.page.select_option(WAY, "heat")  # gain 16: black, red, yellow, white by the largest channel
+    heat = np.clip(3 * 16 * np.abs(a - b).max(-1)[..., None] - [0, 255, 510], 0, 255)
+    editor.wait("the heat", lambda: np.array_equal(overlay(editor, "difference")[..., :3], heat))
+
     whole = editor.page.evaluate("stage.clientWidth / stage.clientHeight")
     editor.page.select_option(WAY, "beside")
     aspect = "document.getElementById('picture').width / document.getElementById('picture').height"

@@ -2,7 +2,7 @@
 // side, mode, gain, closed}. B is kept, also while nothing is compared, until it is thrown away. The functions give the
 // members of the state that become others.
 
-export const MODES = { swipe: "Swipe", beside: "Side by side", difference: "Difference" };
+export const MODES = { swipe: "Swipe", beside: "Side by side", difference: "Difference", heat: "Heat" };
 export const GAINS = [1, 2, 4, 8, 16, 64];
 export const USUAL_GAIN = 4; // an eighth of the range is seen as half of it
 

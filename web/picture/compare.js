@@ -10,18 +10,23 @@ import { GAINS, MODES, compared, gainOf, modeOf } from "../document/variants.js"
 const DIFFERENCE_MS = 250; // between two of them
 const AWAITED = "waiting for its first frame";
 
-// {rmse, psnr, most} of two pictures of one size, in displayed values of 0..1; paints |a - b| * gain.
-export function difference(a, b, out = null, gain = 1) {
+// {rmse, psnr, most} of two pictures of one size, in displayed values of 0..1; paints |a - b| * gain,
+// or the largest of its channels from black over red and yellow to white.
+export function difference(a, b, out = null, gain = 1, isHeat = false) {
   let sum = 0;
   let most = 0;
   for (let i = 0; i < a.data.length; i += 4) {
+    let largest = 0;
     for (let k = 0; k < 3; k += 1) {
       const d = Math.abs(a.data[i + k] - b.data[i + k]);
       sum += d * d;
-      most = Math.max(most, d);
+      largest = Math.max(largest, d);
       if (out) out.data[i + k] = d * gain;
     }
-    if (out) out.data[i + 3] = 255;
+    most = Math.max(most, largest);
+    if (!out) continue;
+    if (isHeat) for (let k = 0; k < 3; k += 1) out.data[i + k] = 3 * largest * gain - 255 * k;
+    out.data[i + 3] = 255;
   }
   const rmse = Math.sqrt(sum / (0.75 * a.data.length)) / 255;
   return { rmse, psnr: rmse > 0 ? -20 * Math.log10(rmse) : Infinity, most: most / 255 };
@@ -127,6 +132,11 @@ export class Comparison {
     return isBeside ? { width, height: (width * box.height) / box.width } : box;
   }
 
+  // Whether one picture shows what lies between both.
+  get isBetween() {
+    return this.isShown("difference") || this.isShown("heat");
+  }
+
   isShown(mode) {
     return this.#compared !== null && modeOf(this.#compared) === mode;
   }
@@ -141,7 +151,7 @@ export class Comparison {
     else delete this.stage.dataset.compare;
     this.canvas.hidden = !on;
     this.divider.hidden = !on || !this.isShown("swipe");
-    this.difference.hidden = this.gains.hidden = !on || !this.isShown("difference");
+    this.difference.hidden = this.gains.hidden = !on || !this.isBetween;
     if (!on) return;
     this.modes.value = modeOf(this.#compared);
     this.gains.value = String(gainOf(this.#compared));
@@ -228,8 +238,8 @@ export class Comparison {
         .replaceChildren(parts, element("span", { class: "unit" }, unit ? ` ${unit}` : ""));
     };
     this.stage.classList.toggle("awaiting", !headers.b);
-    if (this.isShown("difference")) {
-      put("a", [`Difference ×${gainOf(this.#compared)}`]);
+    if (this.isBetween) {
+      put("a", [`${MODES[modeOf(this.#compared)]} ×${gainOf(this.#compared)}`]);
       put("b", headers.b ? [`A ${names.a} against B ${names.b}`] : ["B", names.b, AWAITED]);
     } else
       for (const side of ["a", "b"])
@@ -247,11 +257,17 @@ export class Comparison {
     // A preview is not the picture: what is measured on it says nothing. Its difference is shown all the same.
     const isMeasured = isSame && headers.every(({ scale }) => scale >= 1);
     if (!isMeasured) this.metric.replaceChildren("RMSE …");
-    const isShown = this.isShown("difference");
+    const isShown = this.isBetween;
     if (!isSame || !(isMeasured || isShown)) return;
     const out = isShown ? new ImageData(a.width, a.height) : null;
     const gain = gainOf(this.#compared);
-    const { rmse, psnr, most } = difference(this.first.pixels(), this.#viewport.pixels(), out, gain);
+    const { rmse, psnr, most } = difference(
+      this.first.pixels(),
+      this.#viewport.pixels(),
+      out,
+      gain,
+      this.isShown("heat"),
+    );
     if (out) {
       Object.assign(this.difference, { width: a.width, height: a.height });
       this.difference.getContext("2d").putImageData(out, 0, 0);
