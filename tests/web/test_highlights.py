@@ -96,3 +96,37 @@ def test_alt_click_turns_the_environment_to_its_highlight(editor: Editor, server
     assert brightest(server, turned)[0] == pytest.approx(-0.2, abs=0.03)
     page.keyboard.press("Control+z")
     assert document(editor)["environment"]["rotation"] == 10
+
+
+def test_the_environment_is_a_ball_in_a_ring_that_turns_it(editor: Editor) -> None:
+    page = editor.page
+    editor.outline(shown=True)
+    page.click("#outline-list [data-thing='/environment']")
+    script = """() => {
+        const canvas = document.querySelector("#environment-ball canvas");
+        return [...canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data].join();
+    }"""
+    editor.wait("a ball", lambda: page.evaluate("document.querySelector('#environment-ball canvas').width") == 96)
+    before = page.evaluate(script)
+    ring = page.get_by_role("slider", name="Turn of the ball")
+    box = ring.bounding_box()
+    assert box is not None
+    x, y, radius = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
+    page.mouse.move(x, y - radius + 3)
+    page.mouse.down()
+    page.mouse.move(x - radius + 3, y - 10)
+    page.mouse.move(x - radius + 3, y)
+    page.mouse.up()
+    assert document(editor)["environment"]["rotation"] == 90
+    editor.wait("another ball", lambda: page.evaluate(script) != before)
+    ring.press("PageUp")
+    assert document(editor)["environment"]["rotation"] == 105
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    assert document(editor)["environment"].get("rotation", 0) == 0, "one step of undo for each"
+
+    stops = page.get_by_label("Brightness, strength in stops")
+    assert stops.input_value() == "0"
+    stops.fill("-1.5")
+    stops.press("Enter")
+    assert document(editor)["environment"]["scale"] == pytest.approx(2**-1.5, rel=1e-4)

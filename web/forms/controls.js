@@ -365,6 +365,7 @@ const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
 
 export function control(field, id, events) {
   if (field.widget === "color") return color(field, id, events);
+  if (field.widget === "strength") return strengthControl(field, id, events);
   if (field.widget === "vector") return vector(field, id, events);
   if (field.widget === "texture") return { element: element("span", { id }), show() {} }; // its slot is all there is
   if (field.widget === "choice") return choice(field, id, events);

@@ -1,5 +1,6 @@
 // The selected thing: which fields it has, where it stands, and what can be done with it.
 
+import { EnvironmentPart } from "./environment-part.js";
 import { element } from "../lib/dom.js";
 import { added } from "../document/materials.js";
 import { at } from "../lib/patch.js";
@@ -17,6 +18,7 @@ export class ThingPart {
   constructor(find, { schema, acts, stage, environments }) {
     Object.assign(this, { schema, acts, stage, environments });
     this.#find = find;
+    this.environmentPart = new EnvironmentPart(find("environment-ball"), acts);
     find("thing-material").addEventListener("change", ({ target }) => {
       if (target.selectedOptions[0] === this.#newMaterial)
         return acts.change(added(acts.state, "material", acts.plainMaterial));
@@ -38,6 +40,7 @@ export class ThingPart {
     this.#find("material-part").hidden = Boolean(own) && !this.thing.startsWith("/shapes/");
     if (own) this.#showThing(scene, own);
     else this.#made = null;
+    this.environmentPart.show(this.thing === "/environment" ? (scene.environment ?? null) : null);
     const { environment } = chosen;
     const name = this.environments.find((each) => each.name === environment)?.title;
     this.#find("environment-name").textContent =
@@ -84,7 +87,9 @@ export class ThingPart {
       ? [
           {
             place: this.thing,
-            fields: fields(this.schema, own),
+            fields: fields(this.schema, own).map((field) =>
+              this.thing === "/environment" && field.name === "scale" ? { ...field, widget: "strength" } : field,
+            ),
             read: (values) => values ?? {},
             change: (name, value) => this.acts.edit(`/scene${this.thing}/${name}`, value),
           },

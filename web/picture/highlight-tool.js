@@ -6,7 +6,7 @@ import { mirrored, putOnRay, rotationTo } from "../document/highlights.js";
 import { lampsOf, targetOf } from "../document/lamps.js";
 import { isOn } from "../document/outline.js";
 import { add, length, scale } from "../lib/vector.js";
-import { ballOf, brightestOf } from "./environment-ball.js";
+import { ballsOf, brightestOf } from "./environment-ball.js";
 
 const CHOOSE = "Select a light or the environment first: a highlight is one of these, mirrored.";
 
@@ -28,11 +28,11 @@ export async function placeHighlight({ acts, picker, say }, place, aspect) {
   const isEnvironment = thing === "/environment" && scene.environment;
   if (!lamp && !isEnvironment) throw new Error(CHOOSE);
   if (isOn(acts.state, "locked", [thing])) return say("It is locked");
-  const ball = isEnvironment ? ballOf(scene.environment) : null;
+  const balls = isEnvironment ? ballsOf(scene.environment) : null;
   const found = await mirroredAt(picker, scene, acts.camera, place, aspect);
   if (!found) return say("Nothing there to mirror a light");
   if (isEnvironment) {
-    const own = brightestOf(await ball);
+    const own = brightestOf(await balls);
     if (!own) return say("This environment is the same on all sides");
     const rotation = rotationTo(own, found.way);
     acts.edit("/scene/environment/rotation", rotation, null);

@@ -3,6 +3,7 @@
 import { ball, box, together } from "../document/bounds.js";
 import { axes, frame, ray } from "../document/camera.js";
 import { lampsOf } from "../document/lamps.js";
+import { AxisViews } from "./axis-views.js";
 import { watchGestures } from "./gestures.js";
 import { HANDLED, Handles } from "./handles.js";
 import { placeHighlight } from "./highlight-tool.js";
@@ -46,6 +47,7 @@ export class ViewportController {
       stream,
     );
     this.markers = new Markers(find("markers"), acts, parts.say);
+    this.axisViews = new AxisViews(find("axis-views"), acts, parts.say);
     this.handles = new Handles(find("handles"), {
       acts,
       tool: () => ui.state.tool,
@@ -129,6 +131,7 @@ export class ViewportController {
     const tall = fitGuides(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, this.aspect, tall, target);
     const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
+    this.axisViews.show();
     this.handles.show(HANDLED.includes(tool), this.aspect, height);
   }
 
