@@ -57,15 +57,19 @@ def at(editor: Editor, right: float, up: float) -> tuple[float, float]:
     return x + right * box["height"], y - up * box["height"]
 
 
-def click_until(editor: Editor, right: float, up: float, reached: Callable[[], object]) -> None:
-    """Click there, again whenever the page says that its picture was not ready for that."""
+def click_until(editor: Editor, right: float, up: float, reached: Callable[[], object], *keys: str) -> None:
+    """Click there with these keys held, again whenever the page says that its picture was not ready for that."""
     early = editor.page.locator("#messages button", has_text="×")
 
     def answered() -> bool:
         return bool(reached()) or "Click again" in editor.text("#messages")
 
     def clicked() -> bool:
+        for key in keys:
+            editor.page.keyboard.down(key)
         editor.page.mouse.click(*at(editor, right, up))
+        for key in keys:
+            editor.page.keyboard.up(key)
         editor.wait("an answer", answered)
         if not reached():
             early.first.click()
@@ -104,9 +108,7 @@ def test_alt_click_turns_the_environment_to_its_highlight(editor: Editor, server
     scene = {**BALL, "shapes": BALL["shapes"][:1], "environment": {**sky, "rotation": 10, "background": False}}
     paste(editor, scene)
     page.click("#outline-list [data-thing='/environment']")
-    page.keyboard.down("Alt")
-    click_until(editor, -0.2, 0.05, lambda: document(editor)["environment"]["rotation"] != 10)
-    page.keyboard.up("Alt")
+    click_until(editor, -0.2, 0.05, lambda: document(editor)["environment"]["rotation"] != 10, "Alt")
     turned = document(editor)
     assert brightest(server, scene)[0] != pytest.approx(-0.2, abs=0.1)
     assert brightest(server, turned)[0] == pytest.approx(-0.2, abs=0.03)
