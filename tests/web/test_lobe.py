@@ -159,8 +159,9 @@ def test_both_variants_are_drawn_over_each_other(lobe: Editor) -> None:
     page.click("#compare")
     page.select_option("#comparison select[aria-label^=Turn]", "disney")
     plotted(lobe)
-    lobe.wait("both", lambda: page.locator("#lobe .curve").count() == 2)
-    assert page.inner_text("#lobe .lobe-legend").split("\n") == ["A, Principled", "B, Disney"]
+    both = ["A, Principled", "B, Disney"]  # B begins as a copy of A
+    lobe.wait("both", lambda: page.inner_text("#lobe .lobe-legend").split("\n") == both)
+    lobe.wait("curves", lambda: page.locator("#lobe .curve").count() == 2)
     assert {"A_f_r", "B_f_b"} <= table(lobe)[0].keys()
     for name in ("solid", "terms", "albedo", "slice"):
         view(lobe, name)
