@@ -1,4 +1,4 @@
-"""Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
+"""Pixels -> PNG, JPEG, WebP, AVIF, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
 
 encoders       how each format is written
 metadata       the metadata of PNG and EXR files
@@ -20,6 +20,7 @@ from service.images.encoders import (
     Metadata,
     in_memory,
     over_black,
+    write_avif,
     write_exr,
     write_exr_layers,
     write_hdr,
@@ -67,6 +68,7 @@ FORMATS: dict[FileFormat | StreamFormat, Format] = {
     "png": Format("image/png", write_png, (8, 16), is_displayed=True, has_metadata=True),
     "jpeg": Format("image/jpeg", write_jpeg, (8,), is_displayed=True),
     "webp": Format("image/webp", write_webp, (8,), is_displayed=True),
+    "avif": Format("image/avif", write_avif, (8,), is_displayed=True),
     "exr": Format("image/x-exr", write_exr, (32,), is_displayed=False, has_metadata=True, by_openimageio=True),
     "hdr": Format("image/vnd.radiance", write_hdr, (32,), is_displayed=False, by_openimageio=True),
     "npy": Format("application/octet-stream", write_npy, (32,), is_displayed=False),

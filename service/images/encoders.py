@@ -1,7 +1,7 @@
 """One function for each format, which writes pixels to a file with a descriptor.
 
-`pixels` is (height, width, channels), row 0 at the top. PNG, JPEG and WebP take display-encoded values with straight
-alpha, uint8 or float 0..1; the others linear float32, colour premultiplied.
+`pixels` is (height, width, channels), row 0 at the top. PNG, JPEG, WebP and AVIF take display-encoded values
+with straight alpha, uint8 or float 0..1; the others linear float32, colour premultiplied.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from service.images.metadata import KEY, png_with_text
 QUALITY = 80
 FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
 PNG_LEVEL = 1  # zlib's level: higher ones take several times as long to save some percent
+AVIF_SPEED = 7  # 0 to 10; lower ones take several times as long to save some percent
 BAND = 128  # rows of all layers that are interleaved at a time; a multiple of the 16 that EXR compresses at once
 CHANNELS = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
@@ -52,6 +53,12 @@ def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 def write_webp(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     quality = QUALITY if choices.quality is None else choices.quality
     file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2))
+
+
+def write_avif(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    """8 bits, colour at full resolution."""
+    quality = FULL_COLOUR if choices.quality is None else choices.quality
+    file.write(_pillow(_bytes(pixels), "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED))
 
 
 def write_exr(file: BinaryIO, pixels: Array, choices: Choices) -> None:

@@ -90,6 +90,7 @@ class Info(BaseModel):
     memory: Memory
     limits: dict[str, Any] = Field(description="What may be sent, by the names of the settings.")
     quality: dict[str, Any] = Field(description="The quality presets, with what they cost.")
+    formats: dict[str, list[str]] = Field(description="What is written (pictures, animations) and read (the others).")
 
 
 class Schemas(BaseModel):

@@ -24,6 +24,7 @@ FORMATS = {
     ".jpg": "jpeg",
     ".jpeg": "jpeg",
     ".webp": "webp",
+    ".avif": "avif",
     ".exr": "exr",
     ".hdr": "hdr",
     ".npy": "npy",
@@ -142,7 +143,7 @@ class AsyncPicture:
         return await self.fetch("png", **view)
 
     async def save(self, path: str | Path, **view: Any) -> None:
-        """A file in the format of its ending: .png, .jpg, .webp, .exr, .hdr or .npy. `view`: bits, exposure,
+        """A file in the format of its ending: .png, .jpg, .webp, .avif, .exr, .hdr or .npy. `view`: bits, exposure,
         tone_map, aov. Raises ValueError, OSError, Refused."""
         path = Path(path)
         format = FORMATS.get(path.suffix.lower())

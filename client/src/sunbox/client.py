@@ -272,11 +272,11 @@ class Picture:
         return run(self._picture.png(**view))
 
     def save(self, path: str | Path, **view: Any) -> None:
-        """A file in the format of its ending: .png, .jpg, .webp, .exr, .hdr or .npy."""
+        """A file in the format of its ending: .png, .jpg, .webp, .avif, .exr, .hdr or .npy."""
         run(self._picture.save(path, **view))
 
     def fetch(self, format: str, **view: Any) -> bytes:
-        """The bytes of a file: png, jpeg, webp, exr, hdr or npy."""
+        """The bytes of a file: png, jpeg, webp, avif, exr, hdr or npy."""
         return run(self._picture.fetch(format, **view))
 
     def _repr_png_(self) -> bytes:
