@@ -1,7 +1,7 @@
 import { lightModels, shapeModels } from "../server/schema.js";
 
 // New things: [{title, kind, make(camera, radius, material)}], in the middle of what is looked at, and lights, which have
-// `shines` in the place of `make`: their type.
+// `shines` in the place of `make`: their type; `carries`: all things stand on it.
 export function additions(schema) {
   const shapes = shapeModels(schema);
   const lights = lightModels(schema);
@@ -36,6 +36,7 @@ export function additions(schema) {
         material,
       }),
     },
+    { title: "Ground", needs: shapes.quad, carries: true },
     { title: "Area light", kind: "shapes", needs: shapes.quad, shines: "quad" },
     { title: "Sphere light", kind: "shapes", needs: shapes.sphere, shines: "sphere" },
     { title: "Point light", kind: "lights", needs: lights.point, shines: "point" },
