@@ -37,16 +37,16 @@ def _own(folder: Path) -> Iterator[str]:
     """The address of a server whose data lie in a folder. Ctrl-C is for this process, which ends the server then."""
     environment = {**os.environ, "SUNBOX_DATA_DIR": str(folder / "data"), "SUNBOX_HOST": "127.0.0.1"}
     command = [sys.executable, "-m", "service.cli", "serve", "--host", "127.0.0.1", "--port", "0"]
-    with (folder / "log").open("w+") as log:
+    with (folder / "log").open("w+") as said_there:
         process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+            command, env=environment, stdout=subprocess.PIPE, stderr=said_there, text=True, start_new_session=True
         )
         try:
             assert process.stdout is not None
             said = process.stdout.readline()
             if "http://" not in said:
-                log.seek(0)
-                raise Failed("no server could be started here", *log.read().splitlines()[-3:])
+                said_there.seek(0)
+                raise Failed("no server could be started here", *said_there.read().splitlines()[-3:])
             yield said[said.index("http://") :].strip().rstrip("/")
         finally:
             process.terminate()

@@ -14,7 +14,7 @@ import pytest
 from service.app import create_app
 from service.config import Config
 from service.requests.bodies import SMALL
-from service.routes.submission import _pinned
+from service.routes.submission import pinned
 from service.state import AppState
 from service.system.executors import storing
 
@@ -143,7 +143,7 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
                 assert await small.answered() == 201
                 id = json.loads(small.body)["id"]
                 assert await Call(app, "b", "GET", f"/v1/assets/{id}", b"").answered() == 200
-                async with _pinned(state.storage.quota, [id]):
+                async with pinned(state.storage.quota, [id]):
                     pass
             assert not any(each.done() for each in large)
         finally:

@@ -214,7 +214,8 @@ def test_looking_for_a_document_reads_no_other(saved: Documents) -> None:
 def test_a_large_document_is_sent_from_a_file(tmp_path: Path) -> None:
     """In memory, those that slow clients fetch would add up."""
     text = b'{"a": ' + b"1" * 3_000_000 + b"}"
-    saved = SimpleNamespace(documents=SimpleNamespace(get=lambda *key: text), downloads=Downloads(tmp_path))
+    stored = SimpleNamespace(documents=SimpleNamespace(get=lambda *key: text))
+    saved = SimpleNamespace(storage=stored, downloads=Downloads(tmp_path))
     scope = {"type": "http", "app": SimpleNamespace(state=SimpleNamespace(sunbox=saved)), "client": ("::1", 1)}
     answer: Any = asyncio.run(document(Request(scope), "scenes", "large"))
     assert isinstance(answer, FileAnswer) and answer.media_type == "application/json"

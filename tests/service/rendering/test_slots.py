@@ -59,7 +59,7 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
         for id in range(8):
             await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", [])
         queue = RenderQueue(replace(LIMITS, running=8), store)
-        budget.cache("pictures", lambda: 0, queue.shrink)
+        budget.cache("pictures", lambda: 0, queue.resting.shrink)
         made = lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
         queue.resume(store.load(), made)
         stranger = Job(renderers, Order("stranger", "", SETTINGS), load, b"small", PACKED, budget=MemoryBudget())  # type: ignore[arg-type]
