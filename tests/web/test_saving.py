@@ -112,7 +112,7 @@ def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: Bro
     editor.settled()
     assert not editor.differs(shown, 8)
     editor.page.click("text=Start afresh")
-    editor.wait("the first scene", lambda: not editor.differs(before, 8))
+    editor.wait("the first scene", lambda: editor.text("#scene-title") == "Shader ball")
 
 
 def test_snapshots_and_names(editor: Editor, server: Server) -> None:
