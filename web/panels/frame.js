@@ -11,9 +11,11 @@ export class Frame {
   constructor(find, ui) {
     Object.assign(this, { find, ui });
     find("toggle-outline").addEventListener("click", () => ui.set({ outline: !this.isOutlineShown }));
-    // Where it lies over the rest, what is chosen in it takes its place.
-    find("outline-list").addEventListener("click", () => {
-      if (!BESIDE.matches) ui.set({ outline: false });
+    // Where it lies over the rest, what is chosen in it takes its place; not while several are, or a thing is renamed,
+    // hidden, locked or unfolded.
+    find("outline-list").addEventListener("click", (event) => {
+      const goesOn = event.ctrlKey || event.metaKey || event.shiftKey || event.target.closest("button, input");
+      if (!BESIDE.matches && !goesOn) ui.set({ outline: false });
     });
     ROOMY.addEventListener("change", () => ui.set({ outline: null }));
     const splitter = find("splitter");
