@@ -32,8 +32,9 @@ from service.renders.job import Job
 from service.renders.queue import RenderQueue
 from service.renders.store.record import Order, Outcome, StoredRender
 from service.requests.bodies import Bodies
-from service.requests.request_parser import ParsedRequest, unfolded
+from service.requests.request_parser import unfolded
 from service.requests.request_reader import RequestReader
+from service.scene import Scene
 from service.storage.stores import Storage
 from service.streams.sessions import Sessions
 from service.system.executors import packing
@@ -148,10 +149,10 @@ class AppState:
         it was stored. Raises what reading it raises.
 
         `count` is called with the bytes of memory that parsing takes, before parsing begins."""
-        body = await packing(lambda: bytearray(f'{{"scene":{unfolded(document)}}}', "ascii"))
+        body = await packing(lambda: bytearray(unfolded(document), "ascii"))
         count(await packing(partial(self.bodies.memory_for, body)))
-        parsed: ParsedRequest = await self.bodies.parsed("request", body, counted=True)
-        return await packing(partial(self.reader.pack, parsed.scene))
+        scene: Scene = await self.bodies.parsed("scene", body, counted=True)
+        return await packing(partial(self.reader.pack, scene))
 
     async def gpu_missing(self) -> str | None:
         """The reason why SUNBOX_REQUIRE_GPU forbids to start, or None. Waits for the renderer."""

@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from typing import Any
 
-from service.problems import Conflict, NotFound
 from service.quality import resolve
 from service.renders.job import Job
 from service.renders.status import iso, status
@@ -30,6 +29,7 @@ class Batch:
     number = 0  # rises in the order of arrival
     cancelled = False
     gone = False  # it was deleted, or made room for others
+    queueing = False  # a render is being stored, and is there as soon as it is
 
     def __init__(self, order: BatchOrder) -> None:
         self.order = order
@@ -40,8 +40,7 @@ class Batch:
         self.finished = asyncio.Event()
         self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; whoever waits clears it
         self.ended_at = 0.0  # by the monotonic clock
-        self.making = asyncio.Lock()  # while one of its files is made ...
-        self.files: dict[Any, Any] = {}  # ... of which the last ones stay, by what they show
+        self.making = asyncio.Lock()  # while one of its files is made
         self._busy_s = 0.0  # seconds that ended renders took, setup included
         self._ended = set[int]()
 
@@ -59,17 +58,13 @@ class Batch:
             return
         self._ended.add(step)
         self._busy_s += job.outcome.setup_s + job.elapsed_s
-        self._look()
+        self.look()
 
-    def cancel(self) -> None:
-        """No further renders are made."""
-        self.cancelled = True
-        self._look()
-
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Finish once its last render has ended; after it was cancelled, the last of those that there are."""
         self.changed.set()
         done = len(self._ended) == (len(self.jobs) if self.cancelled else self.order.renders)
-        if done and not self.finished.is_set():
+        if done and not self.queueing and not self.finished.is_set():
             self.ended_at = max((job.ended_at for job in self.jobs.values()), default=time.monotonic())
             self.finished.set()
 
@@ -119,11 +114,3 @@ class Batch:
             self.order.created_at,
         )  # fmt: skip
         return status(order, Outcome(state=self.state_of(step)), 0)
-
-    def job(self, step: int) -> Job:
-        """A render that there is. Raises NotFound, Conflict."""
-        if not 0 <= step < self.order.renders:
-            raise NotFound("There is no render of this id.")
-        if step not in self.jobs:
-            raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
-        return self.jobs[step]

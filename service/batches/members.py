@@ -52,9 +52,6 @@ class Members:
         except TooLarge:
             return self._new_job(member, kept, None)
 
-    def name(self, step: int) -> str:
-        return self._variations.name(step)
-
     def _check(self) -> None:
         document = self._variations.document(0)
         scene = self._reader.scene(document["scene"])

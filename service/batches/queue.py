@@ -11,6 +11,7 @@ from functools import partial
 from service.batches.batch import ID_DIGITS, STEP_DIGITS, Batch, member_id
 from service.batches.members import Members
 from service.problems import Gone, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.renders.job import Job
 from service.renders.queue import RETRY_S, RenderQueue
 from service.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.renders.store.record import IdempotencyKey
@@ -55,17 +56,17 @@ class BatchQueue:
         """The batches that the store has, which go on with `go_on` once they have their renders."""
         for each in stored:
             batch = Batch(each.order)
-            batch.number = each.number
+            batch.number, batch.cancelled = each.number, each.cancelled
             self._batches[batch.id] = batch
-            if each.cancelled:
-                batch.cancel()
         return list(self._batches.values())
 
     def go_on(self) -> None:
         for batch in self._batches.values():
+            if batch.cancelled:
+                self._cancel(batch)
             if batch.finished.is_set():
                 self._renders.keep(batch)
-            elif not batch.cancelled:
+            else:
                 self._begin(batch, None)
 
     def get(self, id: str, owner: str = "") -> Batch:
@@ -93,13 +94,16 @@ class BatchQueue:
 
     async def cancel(self, batch: Batch) -> None:
         """Cancel what waits or runs; the pictures so far stay."""
-        batch.cancel()
+        batch.cancelled = True
         if (store := self._renders.store) is not None:
             await recording(partial(store.batches.cancel, batch.number))
+        self._cancel(batch)
+
+    def _cancel(self, batch: Batch) -> None:
         for job in list(batch.jobs.values()):
             if not job.finished.is_set():
                 self._renders.cancel(job)
-        batch.cancel()  # which has ended now
+        batch.look()
 
     async def delete(self, batch: Batch) -> None:
         """Forget one that has ended, with its pictures."""
@@ -144,13 +148,22 @@ class BatchQueue:
             if batch.cancelled:
                 return
             job = await members.job(step, stored=self._renders.store is not None)
-            while not batch.cancelled:
-                try:
-                    await self._renders.submit_member(job, batch, step)
-                    break
-                except (TooManyRequests, Unavailable) as error:
-                    job.wait(error)
-                    await self._changed(batch, AGAIN_S)
+            while not batch.cancelled and not await self._queued(job, batch, step):
+                await self._changed(batch, AGAIN_S)
+
+    async def _queued(self, job: Job, batch: Batch, step: int) -> bool:
+        """Whether there was room for it in line. A batch that was cancelled meanwhile takes it out again."""
+        batch.queueing = True
+        try:
+            await self._renders.submit_member(job, batch, step)
+        except (TooManyRequests, Unavailable) as error:
+            job.wait(error)
+            return False
+        finally:
+            batch.queueing = False
+            if batch.cancelled:
+                self._cancel(batch)
+        return True
 
     async def _read(self, batch: Batch) -> Members:
         """Of a batch that an earlier server began. Raises NotFound."""

@@ -11,6 +11,7 @@ import logging
 import os
 import tempfile
 import weakref
+from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Hashable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -24,6 +25,7 @@ from service.system.shares import Shares
 
 PIECE = 1 << 18  # bytes that are read and sent at a time
 AT_ONCE = 2  # pictures that are fetched from the renderer and encoded at the same time
+LASTING = 16  # files that stay when they were sent
 ROOM = 4 << 30  # bytes on the disk of pictures that are being sent, of all clients
 RETRY_S = 10
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -106,6 +108,7 @@ class Downloads:
         self._folder = folder
         self._room = asyncio.Semaphore(AT_ONCE)
         self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
+        self._lasting = OrderedDict[Hashable, Written]()  # the last ones that took long to make
         self._written: weakref.WeakValueDictionary[Hashable, Written] = weakref.WeakValueDictionary()
         self._shares = Shares(ROOM, "pictures that are being sent", retry_s=RETRY_S)  # bytes on the disk
 
@@ -163,8 +166,13 @@ class Downloads:
                 raise
             return tempfile.TemporaryFile()
 
-    def keep(self, caller: str, key: Hashable | None, written: Written) -> None:
-        """Count a picture while it is being sent; with `key`, `find` leads other requests to it."""
+    def keep(self, caller: str, key: Hashable | None, written: Written, lasting: bool = False) -> None:
+        """Count a picture while it is being sent; with `key`, `find` leads other requests to it. One that took long
+        to make is `lasting`: it stays for later requests, too, until others of that kind took its place."""
+        if lasting:
+            self._lasting[key] = written
+            while len(self._lasting) > LASTING:
+                self._lasting.popitem(last=False)
         if key is not None:
             self._written[key] = written
         self._shares.count(caller, written.bytes)

@@ -18,7 +18,7 @@ from service.problems import ServiceError, TooLarge, Unavailable
 from service.requests.parser_child import Failed, Work
 from service.requests.parsers import Kind
 from service.requests.request_parser import ParsedRequest
-from service.scene import MeshShape
+from service.scene import MeshShape, Scene
 from service.scene.text import most_bytes
 from service.system.child_processes import Child, Children, Closed
 from service.system.garbage import collector_paused
@@ -142,7 +142,8 @@ def allowed(module: str, name: str) -> Any:
 
 def _believed(answer: Any) -> Any:
     """The answer. Its meshes are looked at again: compiled code reads the vertices that faces name."""
-    for shape in answer.scene.shapes if isinstance(answer, ParsedRequest) else ():
+    scene = answer.scene if isinstance(answer, ParsedRequest) else answer
+    for shape in scene.shapes if isinstance(scene, Scene) else ():
         if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
             raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")
     return answer

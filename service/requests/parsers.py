@@ -14,7 +14,8 @@ from service.scene import load_json
 from service.storage.documents import checked
 
 Kind = Literal[
-    "render", "keyed_render", "batch", "request", "scenes", "materials", "bsdf", "albedo", "terms", "conversion"
+    "render", "keyed_render", "batch", "request", "scene", "scenes", "materials", "bsdf", "albedo", "terms",
+    "conversion",
 ]  # fmt: skip
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
@@ -22,6 +23,7 @@ PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "keyed_render": lambda config, body: RequestParser(config).render(body, keyed=True),
     "batch": lambda config, body: parse_batch(config, body),
     "request": lambda config, body: RequestParser(config).request(body),
+    "scene": lambda config, body: RequestParser(config).scene(load_json(body)),
     "scenes": lambda config, body: checked("scenes", load_json(body), config),
     "materials": lambda config, body: checked("materials", load_json(body), config),
     "bsdf": lambda config, body: parse_values(body),

@@ -25,7 +25,7 @@ from service.images import animation, over_black
 from service.images.animation import MIME, AnimationFormat
 from service.images.contact_sheet import ContactSheet
 from service.ipc.messages import View
-from service.problems import NotProvided, ServiceError, TooLarge
+from service.problems import Conflict, Gone, NotProvided, TooLarge
 from service.renders.job import Job
 from service.renders.store.store import MAKING
 from service.requests.batch_request import variations_of
@@ -36,13 +36,12 @@ from service.system.executors import writing
 SheetFormat = Literal["png", "jpeg", "webp"]
 SHEET_FORMATS: tuple[SheetFormat, ...] = get_args(SheetFormat)
 FRAMES = 64  # times SUNBOX_MAX_PIXELS: pixels of an animation
-MOST_KEPT = 4  # files of one batch that are not made again when they are asked for again
 LONGEST_NAME = 80  # characters in the name of a zipped file
 
 
 def zipped(request: Request, batch: Batch, query: ImageQuery, steps: Sequence[int]) -> Response:
-    """A zip that is made while it is sent: no more than one picture is in memory. A picture that cannot be made any
-    more is left out."""
+    """A zip that is made while it is sent: no more than one picture is in memory. One that was deleted meanwhile is
+    left out."""
     disposition = f'attachment; filename="{batch.id[:8]}.zip"'
     headers = {"cache-control": "no-store", "content-disposition": disposition}
     return StreamingResponse(_zip(request, batch, query, steps), media_type="application/zip", headers=headers)
@@ -55,11 +54,12 @@ async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequenc
             job = batch.jobs[step]
             try:
                 written = await picture_file(request, job, query)
-            except ServiceError:
+            except (Conflict, Gone):
                 continue
             assert written is not None  # as nobody says that the client has gone
             data = await asyncio.to_thread(_whole, written)
-            archive.writestr(zipfile.ZipInfo(f"{_file_name(batch, step, job)}.{query.format}", _date(job)), data)
+            entry = zipfile.ZipInfo(f"{_file_name(batch, step, job)}.{query.format}", _date(job))
+            await asyncio.to_thread(archive.writestr, entry, data)
             yield sent.taken()
     yield sent.taken()
 
@@ -104,8 +104,9 @@ async def sheet(
 ) -> Response:
     """A contact sheet; its cells say of the renders that have no picture how far they are."""
     cell = _scaled(batch, steps, width)
-    layout = _layout(batch, cell)
-    pixels, most = layout.size[0] * layout.size[1], app_state(request).config.max_pixels
+    layout = await writing(partial(_layout, batch, cell))
+    across, down = await writing(lambda: layout.size)  # which measures every name
+    pixels, most = across * down, app_state(request).config.max_pixels
     if pixels > most:
         detail = (
             f"The sheet would have {pixels} pixels: no more than {most} are allowed (SUNBOX_MAX_PIXELS); ask for "
@@ -174,18 +175,15 @@ async def _made(
     fill: Callable[[Path], Awaitable[Callable[[BinaryIO], None]]],
 ) -> Response:  # fmt: skip
     """The answer, from a file that is made once for all who ask while no other render of the batch ends."""
-    state, caller, key = app_state(request), caller_of(request), (*what, tuple(steps))
+    state, caller, key = app_state(request), caller_of(request), (batch.id, *what, tuple(steps))
     async with batch.making:
-        written: Written | None = batch.files.get(key)
+        written = state.downloads.find(key)
         if written is None:
             state.downloads.admit(caller, most_bytes)
             with tempfile.TemporaryDirectory(prefix=MAKING, dir=_folder(state.config.data_dir)) as folder:
                 write = await fill(Path(folder))
                 written = await writing(partial(state.downloads.write, write))
-            state.downloads.keep(caller, None, written)
-            batch.files[key] = written
-            while len(batch.files) > MOST_KEPT:
-                del batch.files[next(iter(batch.files))]
+            state.downloads.keep(caller, key, written, lasting=True)
     return FileAnswer(written.file, mime, {"cache-control": "no-store"}, held=written)
 
 

@@ -245,8 +245,8 @@ async def delete(request: Request, id: answers.RenderId) -> None:
 def _render(request: Request, id: str) -> Job:
     """Raises NotFound, Gone, and Conflict for one of a batch that waits for its turn."""
     state, owner = app_state(request), owner_of(request)
-    if (place := state.batches.waiting(id, owner)) is not None:
-        place[0].job(place[1])
+    if state.batches.waiting(id, owner) is not None:
+        raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
     return state.render_queue.get(id, owner)
 
 

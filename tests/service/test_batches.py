@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import sqlite3
 import zipfile
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from PIL import Image
 
 from service.renders.store.check import check_renders
 from service.storage.data_check import check
+from service.storage.database import FILE
 from tests.serving import ENDLESS, SCENE, SMALL, Server, kill, served, wait_until
 
 ROUGHNESS = {"path": "/materials/ball/roughness", "values": [0.1, 0.9]}
@@ -29,9 +32,8 @@ def status(server: Server, id: str, wait: float = 0) -> Any:
 
 
 def pixels(server: Server, render: str) -> np.ndarray:
-    found: np.ndarray = np.load(
-        io.BytesIO(server.http.get(f"/v1/renders/{render}/image?format=npy").raise_for_status().content)
-    )
+    answer = server.http.get(f"/v1/renders/{render}/image?format=npy").raise_for_status()
+    found: np.ndarray = np.load(io.BytesIO(answer.content))
     return found
 
 
@@ -158,13 +160,17 @@ def test_a_restart_goes_on(tmp_path: Path) -> None:
     wait_until(lambda: status(first, id)["counts"]["done"] >= 2)
     assert first.http.get(f"/v1/batches/{id}/sheet").status_code == 413
     first.http.delete(f"/v1/batches/{gone}").raise_for_status()
+    cut = started(first, [{"turntable": 3}], ENDLESS)
     before = {each["id"]: pixels(first, each["id"]) for each in status(first, id)["renders"][:2]}
     kill(first)
+    with closing(sqlite3.connect(tmp_path / "data" / FILE)) as database, database:  # between that and its renders
+        database.execute("UPDATE batches SET cancelled = 1 WHERE id = ?", (cut,))
     with served(tmp_path, warms=False, SUNBOX_MAX_RUNNING="1") as second:
         found = status(second, id, 60)
         assert found["state"] == "done" and found["counts"]["done"] == 5
         assert all(np.array_equal(picture, pixels(second, render)) for render, picture in before.items())
         assert status(second, gone)["state"] == "cancelled"
+        assert status(second, cut)["state"] == "cancelled" and status(second, cut)["counts"]["cancelled"] == 3
         document = second.http.get(f"/v1/renders/{found['renders'][4]['id']}/scene").json()
         alone = second.http.post("/v1/renders?wait=60", json=document).json()
         assert np.array_equal(pixels(second, alone["id"]), pixels(second, found["renders"][4]["id"]))
