@@ -255,6 +255,15 @@ class Editor:
         script = "(id) => document.querySelector(`#${id} [aria-selected=true]`)?.dataset.value ?? ''"
         return str(self.page.evaluate(script, shelf))
 
+    def leafed(self, shelf: str) -> None:
+        """Wait for every picture of a shelf, going to those that wait until somebody looks."""
+        script = """(all) => {
+            const missing = all.find((image) => !image.naturalWidth);
+            missing?.scrollIntoView({ inline: "center", block: "nearest" });
+            return all.length > 0 && !missing;
+        }"""
+        self.wait(f"pictures of {shelf}", lambda: self.page.locator(f"#{shelf} img").evaluate_all(script))
+
     def drop(self, selector: str, files: dict[str, bytes]) -> None:
         """As when files are let go over an element, in its middle."""
         contents = {name: base64.b64encode(data).decode() for name, data in files.items()}

@@ -18,10 +18,10 @@ SETTINGS = {"width": 48, "height": 48, "max_samples": 64, "max_bounces": 3, "see
 
 def add(editor: Editor, title: str) -> Any:
     """The scene after a light was added."""
-    count = editor.page.locator("#outline-list [role=option]").count()
+    count = editor.page.locator("#outline-list [role=treeitem]").count()
     editor.outline(shown=True)
     editor.page.select_option("#add", label=title)
-    editor.wait(title, lambda: editor.page.locator("#outline-list [role=option]").count() == count + 1)
+    editor.wait(title, lambda: editor.page.locator("#outline-list [role=treeitem]").count() == count + 1)
     return document(editor)
 
 

@@ -73,6 +73,7 @@ def test_the_old_scene_is_not_taken_for_the_new_one(context: BrowserContext, ser
     assert page.is_hidden("#preparing")
     held = []
     editor.pick("scenes", "cornell-boxes")
+    editor.wait("the choice", lambda: editor.chosen("scenes") == "cornell-boxes")
     title = page.get_attribute("#scenes [aria-selected=true]", "aria-label")
     editor.wait("the words", lambda: page.is_visible("#preparing"))
     assert page.inner_text("#preparing").startswith(f"Preparing {title}…")

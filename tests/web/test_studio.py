@@ -139,13 +139,12 @@ def test_scenes_and_environments_are_pictures(editor: Editor) -> None:
     page, before = editor.page, editor.settled()
     page.get_by_role("tab", name="Environments").click()
     environments = page.get_by_role("listbox", name="Environments")
-    loaded = "all => all.every((image) => image.naturalWidth > 0)"
-    editor.wait("pictures", lambda: environments.locator("img").evaluate_all(loaded))
+    editor.leafed("environments")
     environments.get_by_role("option", name="Sunset").click()
     editor.wait_for_change(before)
     page.get_by_role("tab", name="Scenes").click()
     scenes = page.get_by_role("listbox", name="Scenes")
-    editor.wait("pictures", lambda: scenes.locator("img").evaluate_all(loaded))
+    editor.leafed("scenes")
     scenes.get_by_role("option", name="Two point lights").click()
     editor.wait("its name", lambda: editor.text("#scene-title") == "Two point lights")
     assert scenes.get_by_role("option", selected=True).get_attribute("aria-label") == "Two point lights"

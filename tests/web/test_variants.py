@@ -165,6 +165,6 @@ def test_presets_are_pictures_taken_by_the_service(editor: Editor) -> None:
         small.drawImage(image, 0, 0, 1, 1);
         return [image.naturalWidth, ...small.getImageData(0, 0, 1, 1).data];
     })"""
-    editor.wait("pictures", lambda: all(width for width, *_ in editor.page.evaluate(script)))
+    editor.leafed("library")
     colors = np.asarray(editor.page.evaluate(script))[:, 1:4]
     assert len(np.unique(colors, axis=0)) > len(colors) / 2
