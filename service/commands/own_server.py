@@ -19,6 +19,14 @@ if TYPE_CHECKING:
     from sunbox import Client
 
 ENDS_S = 20.0  # for a server that ends
+# Serves until the process of this id ends, however it ends.
+PROGRAM = """
+import sys
+from service.cli import main
+from service.worker.helpers.lifeline import end_with
+if end_with(int(sys.argv[1])):
+    sys.exit(main(["serve", "--host", "127.0.0.1", "--port", "0"]))
+"""
 
 
 @contextmanager
@@ -36,7 +44,7 @@ def server_or_own(url: str | None) -> Iterator[Client]:
 def _own(folder: Path) -> Iterator[str]:
     """The address of a server whose data lie in a folder. Ctrl-C is for this process, which ends the server then."""
     environment = {**os.environ, "SUNBOX_DATA_DIR": str(folder / "data"), "SUNBOX_HOST": "127.0.0.1"}
-    command = [sys.executable, "-m", "service.cli", "serve", "--host", "127.0.0.1", "--port", "0"]
+    command = [sys.executable, "-P", "-c", PROGRAM, str(os.getpid())]
     with (folder / "log").open("w+") as said_there:
         process = subprocess.Popen(
             command, env=environment, stdout=subprocess.PIPE, stderr=said_there, text=True, start_new_session=True

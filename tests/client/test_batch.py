@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from io import BytesIO
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from PIL import Image
 
 import sunbox
 from service.cli import main
-from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.serving import ENDLESS, SCENE, SMALL, Server, wait_until
 
 OVER = {"/materials/ball/roughness": [0.1, 0.9]}
 
@@ -63,6 +65,18 @@ def test_turntable_without_a_server(scene: str, tmp_path: Path) -> None:
     assert main(["turntable", scene, "--frames", "3", *SIZE, "--width", "16", "-o", str(made)]) == 0
     shown = Image.open(made)
     assert shown.size == (16, 12) and shown.n_frames == 3  # type: ignore[attr-defined]
+
+
+def test_a_killed_command_leaves_no_server_behind(scene: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "service.cli", "turntable", scene, "-o", str(tmp_path / "turn.webp")]
+    process = subprocess.Popen([*command, "--spp", str(1 << 24)])
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    wait_until(lambda: children.read_text())
+    (server,) = children.read_text().split()
+    process.kill()
+    process.wait()
+    state = Path(f"/proc/{server}/status")
+    wait_until(lambda: not state.exists() or "(zombie)" in state.read_text())
 
 
 @pytest.mark.parametrize(
