@@ -1,21 +1,22 @@
 """The endpoints: a handler parses, asks, answers. What they share is `service.state`.
 
-renders      renders over REST
-submission   how a request for a render becomes one that waits
-batches      renders that differ along axes
-batch_files  the pictures of a batch in one file
-events       the progress of renders as server-sent events
-waiting      waits that end when the client goes away
-stream       the stream's WebSocket
-materials    a material turned into another model
-bsdf         values of a material's BSDF
-assets       uploads
-documents    saved scenes and materials
-presets      built-in documents
-metrics      /metrics, in Prometheus' format
-info         what the service is, whether it lives, what its documents look like
-answers      what answers look like, for the API's description
-errors       errors as problem+json
-description  openapi.json
-examples     documents that the description shows
+renders          renders over REST
+submission       how a request for a render becomes one that waits
+batches          renders that differ along axes
+batch_files      the pictures of a batch in one file
+events           the progress of renders as server-sent events
+waiting          waits that end when the client goes away
+stream           the stream's WebSocket
+materials        a material turned into another model
+bsdf             values of a material's BSDF
+assets           uploads
+documents        saved scenes and materials
+presets          built-in documents
+metrics          /metrics, in Prometheus' format
+info             what the service is, whether it lives, what its documents look like
+answers          what answers look like, for the API's description
+errors           errors as problem+json
+description      openapi.json
+examples         documents that the description shows
+example_answers  answers that it shows
 """

@@ -21,11 +21,13 @@ from service.routes.examples import (
     ALBEDO,
     ANY_DOCUMENT,
     ASSET,
+    ASSET_ID,
     BATCH,
     BSDF,
     CONVERSION,
     MATERIAL,
     RENDER,
+    RENDER_ID,
     SCENE,
     TERMS,
 )
@@ -37,8 +39,8 @@ TITLES = {row.status: row.title for row in ANSWERS.values()}
 
 DocumentKind = Annotated[str, Path(json_schema_extra={"enum": list(documents.KINDS)}, examples=["scenes"])]
 PresetKind = Annotated[str, Path(json_schema_extra={"enum": list(presets.KINDS)}, examples=["scenes"])]
-RenderId = Annotated[str, Path(description="As the answer to the render's start has it.")]
-AssetId = Annotated[str, Path(description="`sha256:` and 64 hexadecimal digits.")]
+RenderId = Annotated[str, Path(description="As the answer to the render's start has it.", examples=[RENDER_ID])]
+AssetId = Annotated[str, Path(description="`sha256:` and 64 hexadecimal digits.", examples=[ASSET_ID])]
 
 Responses = dict[int | str, dict[str, Any]]
 
@@ -266,6 +268,9 @@ def reference(name: str) -> dict[str, str]:
 
 _ANY = {"application/json": {"schema": ANY_DOCUMENT}}
 DOCUMENT: Responses = {200: {"description": "The document.", "content": _ANY}}
+SCENE_DOCUMENT: Responses = {
+    200: {"description": "The scene.", "content": {"application/json": {"schema": reference("Scene")}}}
+}
 _RENDER: dict[str, Any] = {
     "type": "object",
     "required": ["scene"],
@@ -291,7 +296,7 @@ RENDER_BODY = body(_RENDER, sphere=RENDER)
 RENDER_AGAIN: Responses = {200: {"description": "The body.", "content": {"application/json": {"schema": _RENDER}}}}
 LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAMED}, sphere=RENDER)
 _AXIS = {
-    "anyOf": [reference("Values"), reference("Patches"), reference("Turntable")],
+    "anyOf": [reference("ValuesAxis"), reference("PatchesAxis"), reference("TurntableAxis")],
     "description": "What varies along it.",
 }
 _OVER = {"type": "array", "minItems": 1, "maxItems": MOST_AXES, "items": _AXIS}

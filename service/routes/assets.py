@@ -71,7 +71,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
     "/{id}/scene",
     summary="A glTF file, a zipped OBJ or a mesh as a scene document with a camera that shows it",
     response_class=JSONResponse,
-    responses=answers.DOCUMENT | answers.problems(404, 422),
+    responses=answers.SCENE_DOCUMENT | answers.problems(404, 422),
 )
 async def scene(request: Request, id: answers.AssetId) -> Response:
     """Its references are assets here. The answer to the file's upload has `warnings`, `exposure` and `aspect_ratio`;

@@ -23,6 +23,7 @@ from service.renders.store.record import IdempotencyKey
 from service.requests.batch_request import ParsedBatch
 from service.routes import answers, batch_files, waiting
 from service.routes.errors import GONE
+from service.routes.examples import BATCH_ID
 from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
@@ -32,7 +33,7 @@ router = APIRouter(prefix="/v1", tags=["batches"])
 
 # Of a request, which stays in memory while its renders are made; larger geometry is uploaded as an asset.
 MOST_BYTES = 2 * MIB
-BatchId = Annotated[str, Path(description="As the answer to the batch's start has it.")]
+BatchId = Annotated[str, Path(description="As the answer to the batch's start has it.", examples=[BATCH_ID])]
 Width = Annotated[int | None, Field(ge=1, description="Pixels of one picture, which is scaled down, never up.")]
 
 

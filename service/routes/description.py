@@ -11,6 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from service import scene
+from service.routes import example_answers
 from service.routes.answers import PROBLEM, Problem
 from service.scene import axes
 
@@ -75,6 +76,7 @@ def _described(app: FastAPI, keyed: bool) -> dict[str, Any]:
             answers = call["responses"]
             if "HTTPValidationError" in str(answers.get("422")):
                 answers["422"] = {"description": "A parameter is not valid", **_problem()}
+            _show(call)
             answers.setdefault("default", {"description": "Any other refusal", **_problem()})
             if keyed and path.startswith("/v1/"):
                 call["security"] = [{"key": []}]
@@ -83,6 +85,18 @@ def _described(app: FastAPI, keyed: bool) -> dict[str, Any]:
         found["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
     app.openapi_schema = found
     return found
+
+
+def _show(call: dict[str, Any]) -> None:
+    """Put an example beside each answer that is text. A shape without a name has FastAPI's title, by which generated
+    clients would name a type: it is left out."""
+    for status, answer in call["responses"].items():
+        shown = example_answers.answer(call["operationId"], status) if status.startswith("2") else None
+        for content in answer.get("content", {}).values():
+            if content["schema"].get("title", "").startswith("Response "):
+                del content["schema"]["title"]
+            if shown is not None:
+                content["example"] = shown
 
 
 def _problem() -> dict[str, Any]:
@@ -122,7 +136,8 @@ def _axes() -> dict[str, Any]:
     """What varies along the axes of a batch."""
     kinds = [(kind, "validation") for kind in (axes.Values, axes.Patches, axes.Turntable)]
     _, defined = models_json_schema(kinds, ref_template=HERE + "{model}")  # type: ignore[arg-type]
-    return dict(defined["$defs"])
+    axis = {f"{name}Axis": schema | {"title": f"{name}Axis"} for name, schema in defined["$defs"].items()}
+    return axis
 
 
 def _meshes(schema: dict[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import httpx
+import jsonschema_rs
 import pytest
 
 from service.routes.answers import Info, Schemas
@@ -80,6 +81,40 @@ def test_examples_work_when_pasted(server: Server, description: Any) -> None:
     assert sent >= 5
     for kind in ("scenes", "materials"):
         server.http.delete(f"/v1/documents/{kind}/example")
+
+
+def test_every_operation_has_an_example(description: Any) -> None:
+    """Of its body, of what stands in its path, and of each answer that is text: one that its shape allows."""
+    components = {"components": description["components"]}
+    shown = 0
+    for path, methods in description["paths"].items():
+        for method, call in methods.items():
+            for parameter in call.get("parameters", []):
+                if parameter["in"] == "path":
+                    assert "example" in parameter or parameter["schema"].get("examples"), (path, parameter["name"])
+            for content in call.get("requestBody", {}).get("content", {}).values():
+                assert content["examples"], (method, path)
+            for status, answer in call["responses"].items():
+                for mime, content in answer.get("content", {}).items() if status.startswith("2") else ():
+                    if content["schema"].get("format") == "binary":
+                        continue
+                    assert "example" in content, (method, path, status, mime)
+                    checks = jsonschema_rs.validator_for(_closed(components | content["schema"]))
+                    assert not list(checks.iter_errors(content["example"])), (method, path, status)
+                    shown += 1
+    assert shown > 20
+
+
+def _closed(schema: Any) -> Any:
+    """With models that allow no member but theirs: an example that has a member too many tells of what is no more."""
+    if isinstance(schema, list):
+        return [_closed(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    closed = {name: _closed(child) for name, child in schema.items()}
+    if isinstance(closed.get("properties"), dict):
+        closed.setdefault("additionalProperties", False)
+    return closed
 
 
 def send(http: httpx.Client, method: str, address: str, mime: str, value: Any) -> httpx.Response:

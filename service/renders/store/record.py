@@ -14,7 +14,7 @@ from service.renders.store.fitting import Unfit, fit, read, stored, unknown
 from service.scene.settings import Settings
 
 End = Literal["done", "cancelled", "failed"]
-State = Literal["queued", "running"] | End
+State = Literal["queued", "running", End]
 ENDED: tuple[End, ...] = get_args(End)
 
 
