@@ -49,6 +49,16 @@ def test_all_names_are_there() -> None:
     assert not hasattr(sunbox, "nothing")
 
 
+def test_documents_are_saved(client: sunbox.Client) -> None:
+    client.save("materials", "glass, clear", GLASS, shared=True)
+    assert "glass, clear" in client.documents("materials")
+    assert client.document("materials", "glass, clear") == GLASS
+    client.delete_document("materials", "glass, clear")
+    assert "glass, clear" not in client.documents("materials")
+    with pytest.raises(sunbox.NotFound):
+        client.document("materials", "glass, clear")
+
+
 def test_pixels_are_those_of_the_server(client: sunbox.Client, server: Server) -> None:
     picture = client.render(SCENE, **SMALL)
     path = f"/v1/renders/{next(iter(client.jobs())).id}/image"

@@ -171,6 +171,34 @@ class AsyncClient:
         """A built-in document."""
         return dict(await self._transport.json("GET", f"/v1/presets/{quote(kind, safe='')}/{quote(name, safe='')}"))
 
+    async def documents(self, kind: str) -> list[str]:
+        """The names of saved `scenes` or `materials`: one's own, and those that others share."""
+        names: list[str] = []
+        while True:
+            query = urlencode({"limit": PAGE} | ({"after": max(names)} if names else {}))
+            page = await self._transport.json("GET", f"{_saved(kind)}?{query}")
+            names += [each["name"] for each in page]
+            if len(page) < PAGE:
+                return names
+
+    async def document(self, kind: str, name: str) -> dict[str, Any]:
+        """A saved document."""
+        return dict(await self._transport.json("GET", _saved(kind, name)))
+
+    async def save(
+        self, kind: str, name: str, document: Any, shared: bool | None = None, by_link: bool = False
+    ) -> None:
+        """Saves a scene or a material under a name, in the place of one's own of that name. `shared`: others may read
+        it and see it listed; `by_link`: whoever knows the name may read it."""
+        query = {"shared": str(shared).lower()} if shared is not None else {}
+        query |= {"by_link": "true"} if by_link else {}
+        body = await self._transport.uploaded(document)
+        await self._transport.json("PUT", f"{_saved(kind, name)}?{urlencode(query)}", body)
+
+    async def delete_document(self, kind: str, name: str) -> None:
+        """Deletes a saved document."""
+        await self._transport.json("DELETE", _saved(kind, name))
+
     async def info(self) -> dict[str, Any]:
         """The server's version, renderers, limits and quality presets."""
         return dict(await self._transport.json("GET", "/v1/info"))
@@ -178,3 +206,7 @@ class AsyncClient:
     async def schema(self) -> dict[str, Any]:
         """The JSON schemas of `scene` and `settings`."""
         return dict(await self._transport.json("GET", "/v1/schema"))
+
+
+def _saved(*steps: str) -> str:
+    return "/v1/documents/" + "/".join(quote(step, safe="") for step in steps)

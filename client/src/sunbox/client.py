@@ -120,6 +120,22 @@ class Client:
         """A built-in document."""
         return run(self._client.preset(kind, name))
 
+    def documents(self, kind: str) -> list[str]:
+        """The names of saved `scenes` or `materials`: one's own, and those that others share."""
+        return run(self._client.documents(kind))
+
+    def document(self, kind: str, name: str) -> dict[str, Any]:
+        """A saved document."""
+        return run(self._client.document(kind, name))
+
+    def save(self, kind: str, name: str, document: Any, shared: bool | None = None, by_link: bool = False) -> None:
+        """Saves a scene or a material under a name, in the place of one's own of that name."""
+        run(self._client.save(kind, name, document, shared, by_link))
+
+    def delete_document(self, kind: str, name: str) -> None:
+        """Deletes a saved document."""
+        run(self._client.delete_document(kind, name))
+
     def info(self) -> dict[str, Any]:
         """The server's version, renderers, limits and quality presets."""
         return run(self._client.info())
