@@ -227,6 +227,7 @@ _ROWS = (
     Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
     Flag("HAS_VAST_SPHERES", lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any())),
     Flag("HAS_QUADS", _linear(ShapeKind.QUAD), previewed=lambda s: len(s.boxes) > 0),  # of one that shines
+    Flag("HAS_DISKS", lambda s: bool((s.quads["shape"] & np.uint32(layout.ROUND)).any())),
     Flag("HAS_BOXES", _linear(ShapeKind.BOX)),
     Flag("HAS_ELLIPSOIDS", _linear(ShapeKind.ELLIPSOID)),
     Flag("HAS_TRIANGLES", _linear(ShapeKind.TRIANGLE)),

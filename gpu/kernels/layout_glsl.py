@@ -112,6 +112,7 @@ def constants() -> str:
         "NONE",
         "SINGLE_SIDED",
         "HIDDEN",
+        "ROUND",
         "NORMALS_SMOOTH",
         "NORMALS_LEFT",
         "TANGENT_SHIFT",

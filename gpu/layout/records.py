@@ -21,6 +21,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear Rec.709
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises the flags it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: rays that come from behind pass the triangle
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
+ROUND = 0x20000000  # in Quad.shape: only the ellipse that touches its four edges is there, which is a disk
 # In TriangleNormals.bits: NORMALS_SMOOTH: the corners' normals are interpolated; NORMALS_LEFT: v grows to the right
 # of u, seen from outside. From TANGENT_SHIFT on follow three codes of TANGENT_BITS each: 0 for no tangent, else 1 +
 # its angle in the plane of the corner's normal, in steps. A step is 0.35 degrees, less than a normal map of 8 bits
@@ -97,6 +98,8 @@ class Sphere(Record):
 
 
 class Quad(Record):
+    """A parallelogram; with ROUND the disk in it, an ellipse where a transform stretches it."""
+
     slot = Slot.QUADS
     origin: vec3
     material: u32
@@ -109,7 +112,7 @@ class Quad(Record):
     u: vec3
     area: f32
     v: vec3
-    shape: u32
+    shape: u32  # index in the scene document, with ROUND and HIDDEN
 
 
 class Solid(Record):

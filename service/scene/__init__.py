@@ -45,7 +45,7 @@ from service.scene.patch import merge_patch
 from service.scene.saved_material import SavedMaterial, check_saved_material
 from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
-from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
+from service.scene.shape import BoxShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 from service.scene.text import load_json
 from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, ScalarTexture, Texture
 from service.scene.transform import MatrixTransform, Transform
@@ -61,6 +61,7 @@ __all__ = [
     "CubemapEnvironment",
     "DiffuseMaterial",
     "DirectionalLight",
+    "DiskShape",
     "DisneyMaterial",
     "Environment",
     "ImageEnvironment",

@@ -1,4 +1,4 @@
-"""The shapes: sphere, quad, box and mesh."""
+"""The shapes: sphere, quad, disk, box and mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, model_validator
 from service.scene.base import OMITTABLE, hint, refusal
 from service.scene.named import Name, Named
 from service.scene.number_arrays import Colors, Coordinates, Directions, Points, Triangles, first_beyond
-from service.scene.numbers import Point, PositiveLength
+from service.scene.numbers import Direction, Point, PositiveLength
 from service.scene.transform import AnyTransform
 
 # The sine between a quad's edges below which its float32 normal is noise: the spacing of float32 near 1.
@@ -56,6 +56,19 @@ class QuadShape(_Placed):
         if area <= LEAST_SINE * edges or np.float32(area) == 0.0:
             raise refusal("has no area: u and v must not be zero nor parallel")
         return self
+
+
+class DiskShape(_Placed):
+    """A flat disk; its front is where the normal points."""
+
+    type: Literal["disk"]
+    center: Annotated[Point, hint("Centre", "The middle of the disk.", unit="m", widget="number")]
+    normal: Annotated[
+        Direction, hint("Normal", "The way its front faces, to which it emits; any length.", unit="", widget="number")
+    ]
+    radius: Annotated[
+        PositiveLength, hint("Radius", "From the centre to the rim.", unit="m", widget="slider", soft=5)
+    ]
 
 
 class BoxShape(_Placed):
@@ -160,4 +173,4 @@ def _check_numbers(vertices: np.ndarray, faces: np.ndarray) -> None:
         raise refusal(f"{row} names a vertex that is not there: the last is {last}", at=f"/faces/{beyond}")
 
 
-Shape = Annotated[SphereShape | QuadShape | BoxShape | MeshShape, Field(discriminator="type")]
+Shape = Annotated[SphereShape | QuadShape | DiskShape | BoxShape | MeshShape, Field(discriminator="type")]

@@ -20,6 +20,7 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "lights/environment.glsl"
 #include "lights/emitter.glsl"
 #include "lights/sphere.glsl"
+#include "lights/disk.glsl"
 #include "lights/quad.glsl"
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"

@@ -35,7 +35,7 @@ QuadView quad_light_view(Quad q, vec3 p) {
     float d1 = l.x * l.y * l.z + ab * l.z + ac * l.y + bc * l.x;
     float d2 = l.x * l.z * l.w + ac * l.w + ad * l.z + cd * l.x;
     float s = 2.0 * sampling_angle(h * (d1 + d2), d1 * d2 - h * h);
-    bool rectangle = abs(dot(q.dual_u, q.dual_v)) <= 1e-5;
+    bool rectangle = !disk_is(q) && abs(dot(q.dual_u, q.dual_v)) <= 1e-5;
     w.s = rectangle && s >= QUAD_LIGHT_LEAST ? s : 0.0;
     w.a = l.x;
     w.d = l.w;
@@ -77,7 +77,7 @@ vec2 quad_light_place(QuadView w, vec2 u) {
 LightSample quad_light_sample(Quad q, vec3 p, vec2 u, uint sides) {
     QuadView w = quad_light_view(q, p);
     if (!quad_light_shines(q, p, sides)) return lights_none();
-    vec2 place = w.s > 0.0 ? quad_light_place(w, u) : u;
+    vec2 place = w.s > 0.0 ? quad_light_place(w, u) : disk_is(q) ? disk_light_place(u) : u;
     SurfacePoint at;
     at.p = q.origin + place.x * q.u + place.y * q.v;
     at.ng = q.normal;

@@ -8,6 +8,7 @@ float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     float a = dot(p, q.dual_u), b = dot(p, q.dual_v);
     float slack = gamma_error(8.0) * (2.0 * t + q.u_length + q.v_length);
     bool inside = min(min(a, q.u_length - a), min(b, q.v_length - b)) >= -slack;
+    inside = inside && disk_holds(q, vec2(a, b) / vec2(q.u_length, q.v_length));
     return inside && t > 0.0 && t < t_max ? t : t_max;
 }
 
@@ -26,7 +27,7 @@ SurfacePoint quad_point(Quad q, vec3 p, uint id) {
     r.tangent = q.u;
     r.material = q.material;
     r.light = q.light;
-    r.shape = q.shape;
+    r.shape = disk_is(q) ? q.shape & ~ROUND : q.shape;
     r.flat_id = id;
 #if HAS_TEXTURES || HAS_ANISOTROPIC
     r.handed = dot(cross(q.normal, q.u), q.v) < 0.0 ? -1.0 : 1.0;

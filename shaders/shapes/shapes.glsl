@@ -25,6 +25,7 @@ struct SurfacePoint {
 #include "math/basis.glsl"
 #include "material/material.glsl"
 #include "shapes/sphere.glsl"
+#include "shapes/disk.glsl"
 #include "shapes/quad.glsl"
 #include "shapes/solid.glsl"
 #include "shapes/instance.glsl"

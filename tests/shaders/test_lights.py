@@ -171,6 +171,21 @@ def _parallelogram_factor(shape: dict[str, Any]) -> float:
     return abs(total) / (2 * math.pi)
 
 
+@pytest.mark.parametrize("d", [0.02, 0.7, 30.0])
+@pytest.mark.parametrize("sides", ["front", "both"])
+def test_disk_overhead(gpu: Renderer, d: float, sides: str) -> None:
+    """E = pi L r^2 / (r^2 + d^2) under the middle of a disk; behind one whose front alone shines it is dark."""
+    r = 0.4
+    disk = {"type": "disk", "center": [0, 0, d], "normal": [0, 0, -3], "radius": r, "material": "lamp"}
+    camera = {"position": [-0.01, -0.01, 0.005], "target": [0, 0, 0], "vfov": 0.02}
+    for estimator in ESTIMATORS if d == 0.7 else ("mis",):
+        lamp = LAMP if sides == "front" else BOTH
+        image = _spot(gpu, _lit(disk, lamp=lamp, camera=camera), 1 << 16, estimator=estimator)
+        np.testing.assert_allclose(image, 0.8 * r * r / (r * r + d * d) * COLOR, rtol=0.03)
+        away = _spot(gpu, _lit({**disk, "normal": [0, 0, 1]}, lamp=lamp, camera=camera), 1 << 14, estimator=estimator)
+        assert away.max() == 0 if sides == "front" else np.allclose(away, image, rtol=0.06)
+
+
 SHEARED = {"type": "quad", "origin": [0, 0, 1.1], "u": [0.6, 0.7, 0], "v": [0.9, 0, 0.1], "material": "lamp"}
 
 
@@ -234,26 +249,48 @@ VIEWS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["quad", "triangle"])
+def _flat(kind: str, origin: np.ndarray, u: np.ndarray, v: np.ndarray) -> dict[str, Any]:
+    if kind == "triangle":
+        corners = [origin.tolist(), (origin + u).tolist(), (origin + v).tolist()]
+        return {"type": "mesh", "vertices": corners, "faces": [[0, 1, 2]], "smooth": False}
+    if kind == "disk":  # one that is stretched to touch the edges of the quad
+        axes = np.stack([u / 2, v / 2, np.cross(u, v), origin + (u + v) / 2], 1)
+        matrix = [*axes.ravel().tolist(), 0, 0, 0, 1]
+        return {
+            "type": "disk",
+            "center": [0, 0, 0],
+            "normal": [0, 0, 1],
+            "radius": 1,
+            "transform": {"matrix": matrix},
+        }
+    return {"type": "quad", "origin": origin.tolist(), "u": u.tolist(), "v": v.tolist()}
+
+
+def _inside(kind: str, grid: np.ndarray) -> np.ndarray:
+    """The share of each place of the unit square's grid that the lamp covers."""
+    if kind == "triangle":
+        return np.where(np.isclose(grid.sum(1), 1), 0.5, grid.sum(1) < 1)  # half cells on its edge
+    return np.hypot(*(2 * grid - 1).T) <= 1 if kind == "disk" else np.ones(len(grid))
+
+
+@pytest.mark.parametrize("kind", ["quad", "disk", "triangle"])
 @pytest.mark.parametrize("view", VIEWS)
 def test_flat_lamps_are_sampled_with_their_density(gpu: Renderer, view: str, kind: str) -> None:
     """Chi-square over cells of the lamp: samples against the density that MIS takes, integrated in float64."""
     origin, u, v = (np.array(a, float) for a in VIEWS[view])
-    triangle = kind == "triangle"
-    shape: dict[str, Any] = {"type": "quad", "origin": origin.tolist(), "u": u.tolist(), "v": v.tolist()}
-    if triangle:
-        corners = [origin.tolist(), (origin + u).tolist(), (origin + v).tolist()]
-        shape = {"type": "mesh", "vertices": corners, "faces": [[0, 1, 2]], "smooth": False}
+    triangle, shape = kind == "triangle", _flat(kind, origin, u, v)
     packed = pack(parse_scene(document([{**shape, "material": "lamp"}], {"lamp": BOTH})), Images()).arrays
-    prober, n, cells, fine = prober_of(gpu), 200_000, 16, 16
+    prober, n, cells, fine = prober_of(gpu), 200_000, 16, 32 if kind == "disk" else 16
     flags = frozenset({"HAS_EMISSION", "HAS_EMISSION_BOTH", "HAS_QUAD_LIGHTS", "HAS_TRIANGLE_LIGHTS"})
+    flags |= {"HAS_DISKS"} if kind == "disk" else set()
     records = {Slot.TRIANGLES: packed.triangles} if triangle else {Slot.QUADS: packed.quads}
 
     def ask(sample: int, asks: np.ndarray) -> np.ndarray:
         wide = np.zeros((len(asks), 4), np.float32)
         wide[:, :2] = asks
+        entry = "triangles.comp" if triangle else "quads.comp"
         return prober.run(
-            f"{kind}s.comp", len(asks), {Slot.SUM: wide, **records}, (Slot.OUTPUT,), {"SAMPLE": sample},
+            entry, len(asks), {Slot.SUM: wide, **records}, (Slot.OUTPUT,), {"SAMPLE": sample},
             flags, p=tuple(-x for x in packed.origin), sides=2,
         )[0].astype(float)  # fmt: skip
 
@@ -266,12 +303,12 @@ def test_flat_lamps_are_sampled_with_their_density(gpu: Renderer, view: str, kin
     grid = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2)
     p = origin + grid @ np.stack([u, v])
     d = np.linalg.norm(p, axis=1)
-    inside = np.where(np.isclose(grid.sum(1), 1), 0.5, grid.sum(1) < 1) if triangle else 1.0  # half cells on its edge
-    density = ask(0, grid)[:, 3] * np.abs(p @ normal) / d**3 * inside  # per area of the unit square
+    density = ask(0, grid)[:, 3] * np.abs(p @ normal) / d**3 * _inside(kind, grid)  # per area of the unit square
     expected = density.reshape(cells, fine, cells, fine).sum((1, 3)) / (cells * fine) ** 2
     assert expected.sum() == pytest.approx(1, abs=3e-3)
     assert place.min() > -1e-3 and place.max() < 1.001 and (not triangle or place.sum(1).max() < 1.001)
-    assert stats.chi_square(observed, expected / expected.sum() * n) > stats.sidak(1e-3, 2 * len(VIEWS))
+    assert kind != "disk" or np.hypot(*(2 * place - 1).T).max() < 1.001
+    assert stats.chi_square(observed, expected / expected.sum() * n) > stats.sidak(1e-3, 3 * len(VIEWS))
     again = ask(0, place)[:, 3]  # one density, whoever asks
     np.testing.assert_allclose(again, drawn[:, 3], rtol=2e-3)
 
@@ -283,6 +320,7 @@ def _crowd() -> dict[str, Any]:
         {"type": "sphere", "center": [0, -0.3, 0], "radius": 0.7, "material": "metal"},
         {"type": "quad", "origin": [-1, 2.5, -1], "u": [2, 0, 0], "v": [0, 0, 2], "material": "lamp"},
         {"type": "quad", "origin": [-2, -0.5, -1], "u": [0, 1, 0], "v": [0.3, 0, 1.4], "material": "panel"},
+        {"type": "disk", "center": [1.5, 1.2, 1.4], "normal": [-1, -1, -1], "radius": 0.5, "material": "panel"},
         {"type": "sphere", "center": [1.3, 0.2, 0.4], "radius": 0.3, "material": "bulb"},
         {"type": "sphere", "center": [0, 0, 0], "radius": 0.3, "material": "bulb", "visible_to_camera": False,
          "transform": {"translate": [-1, 0.6, 0.8], "scale": [1, 0.5, 1.4]}},

@@ -22,6 +22,9 @@ ROWS: dict[str, dict[str, Any]] = {
     "ellipsoid": {"type": "sphere", "center": [0, 0, 0], "radius": 1, "transform": TURNED},
     "quad": {"type": "quad", "origin": [-1, -0.5, 0.2], "u": [2, 0.3, 0], "v": [0.2, 1, 0.5]},
     "turned quad": {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "transform": TURNED},
+    "disk": {"type": "disk", "center": [0.2, -0.1, 0.3], "normal": [1, 2, -3], "radius": 0.9},
+    "level disk": {"type": "disk", "center": [0, 0, 0], "normal": [0, -1, 0], "radius": 1.2},
+    "turned disk": {"type": "disk", "center": [0, 0, 0], "normal": [0, 0, 2], "radius": 1, "transform": TURNED},
     "box": {"type": "box", "min": [-0.7, -0.4, -0.9], "max": [0.5, 0.8, 0.3]},
     "turned box": {"type": "box", "min": [-1, -1, -1], "max": [1, 1, 1], "transform": TURNED},
 }  # fmt: skip
@@ -48,6 +51,11 @@ def expected(shape: dict[str, Any], o: np.ndarray, d: np.ndarray) -> tuple[np.nd
             p = o + t[:, None] * d - shape["origin"]
             s = p @ np.linalg.pinv(np.stack([u, v], 1)).T
             t = np.where((s >= 0).all(1) & (s <= 1).all(1) & (t > 0), t, np.nan)
+        elif shape["type"] == "disk":
+            n = np.broadcast_to(np.array(shape["normal"], float), o.shape)
+            t = ((np.array(shape["center"]) - o) * n).sum(1) / (d * n).sum(1)
+            off = np.linalg.norm(o + t[:, None] * d - shape["center"], axis=1)
+            t = np.where((off <= shape["radius"]) & (t > 0), t, np.nan)
         else:
             lo, hi = np.array(shape["min"]), np.array(shape["max"])
             ta, tb = (lo - o) / d, (hi - o) / d
@@ -93,6 +101,7 @@ CLOSED = {
     "ellipsoid": {"type": "sphere", "center": [0, 0, 0], "radius": 1, "transform": {"scale": [1, 0.3, 0.5]}},
     "box": {"type": "box", "min": [-0.6, -0.5, -0.4], "max": [0.5, 0.6, 0.7]},
     "quad": {"type": "quad", "origin": [-0.6, -0.5, 0], "u": [1.2, 0, 0], "v": [0, 1.1, 0]},
+    "disk": {"type": "disk", "center": [0, 0.1, 0], "normal": [1, 1, 1], "radius": 0.8},
 }
 
 

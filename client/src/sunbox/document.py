@@ -214,6 +214,26 @@ class DirectionalLight(TypedDict, total=False):
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
 
+class DiskShape(TypedDict, total=False):
+    """A flat disk; its front is where the normal points."""
+
+    type: Required[Literal["disk"]]
+    center: Required[list[float]]
+    """The middle of the disk. (m)"""
+    normal: Required[list[float]]
+    """The way its front faces, to which it emits; any length."""
+    radius: Required[float]
+    """From the centre to the rim. (m, 0 to 1e+09)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
 class DisneyMaterial(TypedDict, total=False):
     """The "principled" BRDF of Burley's 2012 course notes."""
 
@@ -574,7 +594,7 @@ Material = (
 )
 
 
-Shape = SphereShape | QuadShape | BoxShape | MeshShape
+Shape = SphereShape | QuadShape | DiskShape | BoxShape | MeshShape
 
 
 class Scene(TypedDict, total=False):

@@ -15,6 +15,7 @@ Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
 SAME_SCALE = 1e-6  # relative difference of scales up to which a sphere stays a sphere: typed matrices have 7 digits
 SLACK = 2.0  # a box or an edge may reach from one end of the range of coordinates to the other
+LEVEL = 1e-6  # sine of the tilt of a disk up to which it is level: where it leans would be noise
 LEAST = 1e-12  # m; the cube of a shorter length, or of its inverse, is outside float32
 
 # Corner and edges of the faces of the cube [-1, 1]^3: seen from outside u is right and v up, with +Y up;
@@ -51,6 +52,7 @@ class AnalyticShapes:
     spheres_used: list[tuple[int, int]] = field(default_factory=list)
     quads: list[tuple[Vec3, Vec3, Vec3, bool]] = field(default_factory=list)  # origin, u, v, mirrored
     quads_used: list[tuple[int, int]] = field(default_factory=list)
+    quads_round: list[bool] = field(default_factory=list)  # disks: of the quad only the ellipse in it is there
     boxes: Solids = field(default_factory=Solids)
     ellipsoids: Solids = field(default_factory=Solids)
     vanished: list[int] = field(default_factory=list)  # shapes too small to be traced
@@ -75,7 +77,16 @@ class AnalyticShapes:
         self.spheres.append((center, radius, rotation))
         self.spheres_used.append(used)
 
-    def quad(self, origin: Vec3, u: Vec3, v: Vec3, matrix: np.ndarray | None, used: tuple[int, int]) -> None:
+    def disk(
+        self, center: Vec3, normal: Vec3, radius: float, matrix: np.ndarray | None, used: tuple[int, int]
+    ) -> None:
+        right, up = _across(normal)
+        u, v = 2 * radius * right, 2 * radius * up
+        self.quad(tuple(center - (u + v) / 2), tuple(u), tuple(v), matrix, used, is_round=True)
+
+    def quad(
+        self, origin: Vec3, u: Vec3, v: Vec3, matrix: np.ndarray | None, used: tuple[int, int], is_round: bool = False
+    ) -> None:
         mirrored = False
         if matrix is not None:
             axes = matrix[:3, :3]
@@ -84,6 +95,7 @@ class AnalyticShapes:
         if self._fits(used, origin, math.hypot(*u), math.hypot(*v)):
             self.quads.append((origin, u, v, mirrored))
             self.quads_used.append(used)
+            self.quads_round.append(is_round)
 
     def box(self, low: Vec3, high: Vec3, matrix: np.ndarray | None, used: tuple[int, int], emissive: bool) -> None:
         """Add a box; one that shines becomes six quads, as lights are sampled face by face."""
@@ -109,6 +121,16 @@ class AnalyticShapes:
             self.vanished.append(used[1])
             return False
         return True
+
+
+def _across(normal: Vec3) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors to the right and up, seen from where the normal points, with +Y up; of a level disk -Z is up from
+    above and +Z from below, as on a box."""
+    n = np.divide(normal, math.hypot(*normal))
+    right = np.array([n[2], 0.0, -n[0]])
+    length = math.hypot(*right)
+    right = right / length if length > LEVEL else np.array([1.0, 0.0, 0.0])
+    return right, np.cross(n, right) / math.hypot(*np.cross(n, right))
 
 
 def check_reach(shape: int, reach: float) -> None:

@@ -65,8 +65,19 @@ def quads(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bound
     records["dual_u"] = np.cross(v, normal) / v_size[:, None]
     records["dual_v"] = np.cross(normal, u) / u_size[:, None]
     records["u_length"], records["v_length"] = area / v_size, area / u_size
+    # The half extents of a parallelogram are the sums of its half edges' parts, those of its ellipse their length.
+    is_round = np.array(placed.quads_round)[:, None]
+    records["area"] *= np.where(is_round[:, 0], np.pi / 4, 1.0)
     corners4 = np.stack([corner, corner + u, corner + v, corner + u + v])
-    return records, (corners4.min(axis=0), corners4.max(axis=0))
+    middle, reach = corner + (u + v) / 2, np.hypot(u, v) / 2
+    low = np.where(is_round, middle - reach, corners4.min(axis=0))
+    high = np.where(is_round, middle + reach, corners4.max(axis=0))
+    return records, (low, high)
+
+
+def mark_disks(quads: np.ndarray, placed: AnalyticShapes) -> None:
+    """Set the bit of the quads of which only the disk in them is there."""
+    quads["shape"] |= np.where(placed.quads_round, layout.ROUND, 0).astype(np.uint32)
 
 
 def boxes(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:

@@ -19,7 +19,7 @@ from service.pack.geometry.warnings import OddMesh
 from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
-from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
+from service.scene.shape import BoxShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 
 
 @dataclass(frozen=True)
@@ -121,6 +121,8 @@ def place_analytic(shapes: Sequence[Shape], materials: ShapeMaterials) -> Analyt
                 placed.sphere(shape.center, shape.radius, matrix, used)
             case QuadShape():
                 placed.quad(shape.origin, shape.u, shape.v, matrix, used)
+            case DiskShape():
+                placed.disk(shape.center, shape.normal, shape.radius, matrix, used)
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in materials.emissive)
     return placed
