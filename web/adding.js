@@ -1,6 +1,6 @@
 // Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
 
-import { box, remember, together } from "./document/bounds.js";
+import { box, isFlat, remember, together } from "./document/bounds.js";
 import { axes, halfHeight, isInSight } from "./document/camera.js";
 import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
@@ -22,7 +22,7 @@ function beamAround(radius, distance) {
 
 // The box around a scene: by its shapes, else by what its camera has in view.
 function sizeOf({ shapes }, camera) {
-  const known = shapes.filter(({ type }) => type !== "quad").map(box);
+  const known = shapes.filter((shape) => !isFlat(shape)).map(box);
   if (known.length && known.every(Boolean)) return union(known);
   const reach = halfHeight(camera, axes(camera).distance);
   return { low: camera.target.map((x) => x - reach), high: camera.target.map((x) => x + reach) };
@@ -42,7 +42,7 @@ export class Adder {
     const { materials } = acts.state.scene;
     const material = fresh(title.toLowerCase(), materials);
     const made = make(acts.camera, this.controller.radius(), material);
-    return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: made.type !== "quad" });
+    return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: !isFlat(made) });
   }
 
   // Has all things stand on a ground, in the place of the one that there was.
@@ -50,7 +50,9 @@ export class Adder {
     const boxes = await this.controller.boxes();
     const { acts } = this;
     const { scene, chosen } = acts.state;
-    const bodies = boxes.filter((each, i) => each && scene.shapes[i]?.type !== "quad" && !isStage(scene.shapes[i]));
+    const bodies = boxes.filter(
+      (each, i) => each && scene.shapes[i] && !isFlat(scene.shapes[i]) && !isStage(scene.shapes[i]),
+    );
     const before = scene.shapes.find(isStage);
     const material = before?.material ?? fresh("stage", scene.materials);
     const around = bodies.length ? union(bodies) : sizeOf({ shapes: [] }, acts.camera);
@@ -91,7 +93,9 @@ export class Adder {
     const own = (await this.controller.boxes())[Number(thing.split("/")[2])];
     if (own && solids([own], this.acts.camera.position).length) return this.#put([original], { around: own });
     // A floor or a wall comes in front of itself; what can't be measured goes aside.
-    const away = original.type === "quad" ? normalize(cross(original.u, original.v)) : axes(this.acts.camera).right;
+    const away = isFlat(original)
+      ? normalize(original.normal ?? cross(original.u, original.v))
+      : axes(this.acts.camera).right;
     return this.acts.add(kind, moved(original, scale(away, this.controller.radius())));
   }
 
@@ -152,7 +156,7 @@ export class Adder {
     const boxes = await this.controller.boxes();
     const { scene, chosen } = this.acts.state;
     const { camera } = this.acts;
-    const bodies = boxes.filter((_, i) => scene.shapes[i]?.type !== "quad");
+    const bodies = boxes.filter((_, i) => !scene.shapes[i] || !isFlat(scene.shapes[i]));
     const way = own && wayOut(own, solids(bodies, camera.position), axes(camera).right, { stands });
     const placed = way ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
     const stand = own && way ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;

@@ -115,6 +115,17 @@ def test_marks_and_strengths(editor: Editor) -> None:
     page.locator("#markers .lamp").click(force=True)
     assert page.get_attribute("#outline-list [data-thing='/shapes/2']", "aria-selected") == "true"
 
+    scene = add(editor, "Disk light")
+    (disk,) = [shape for shape in scene["shapes"] if shape["type"] == "disk"]
+    way = np.array([0, 1, 0]) - disk["center"]
+    assert np.array(disk["normal"]) @ way / np.linalg.norm(way) == pytest.approx(1, abs=1e-3), "it faces the ball"
+    page.locator("#markers .mark.chosen").focus()
+    page.keyboard.press("ArrowRight")
+    slid = document(editor)["shapes"][3]
+    way = np.array([0, 1, 0]) - slid["center"]
+    assert slid["center"] != disk["center"] and slid["radius"] == disk["radius"] and "transform" not in slid
+    assert np.array(slid["normal"]) @ way / np.linalg.norm(way) == pytest.approx(1, abs=1e-3), "and still does"
+
     scene = add(editor, "Point light")
     strength = page.get_by_role("slider", name="Intensity, strength")
     assert "stops" in str(strength.get_attribute("aria-valuetext"))

@@ -1,7 +1,7 @@
 // The ball around a shape, as far as its document or what was uploaded here tells; other files of triangles are
 // measured in the picture.
 
-import { add, cross, dot, length, mix, scale, subtract } from "../lib/vector.js";
+import { add, cross, dot, length, mix, normalize, scale, subtract } from "../lib/vector.js";
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
@@ -74,7 +74,31 @@ export function see({ asset, transform }, cloud) {
   seen.set(asset, corners(low, high));
 }
 
+// What is flat by its kind: a floor, a wall, a panel.
+export const isFlat = ({ type }) => type === "quad" || type === "disk";
+
+const RIM = 32; // points on a disk's rim, whose box is half a per cent too small at most
+
+// The unit axes of a disk before its transform: two across its normal, and that.
+export function diskAxes({ normal }) {
+  const n = normalize(normal);
+  const right = Math.hypot(n[0], n[2]) > 1e-6 ? normalize([n[2], 0, -n[0]]) : [1, 0, 0];
+  return [right, cross(n, right), n];
+}
+
+// Points on the rim of a disk before its transform.
+export function rimOf(disk) {
+  const { center, radius } = disk;
+  const [right, up] = diskAxes(disk);
+  return Array.from({ length: RIM }, (_, i) => {
+    const angle = (2 * Math.PI * i) / RIM;
+    const way = add(scale(right, Math.cos(angle)), scale(up, Math.sin(angle)));
+    return add(center, scale(way, radius));
+  });
+}
+
 function points(shape) {
+  if (shape.type === "disk") return rimOf(shape);
   if (shape.type === "box") return corners(shape.min, shape.max);
   if (shape.type === "quad") {
     const { origin, u, v } = shape;

@@ -7,6 +7,7 @@ import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
 import { dressed } from "./dressing.js";
 import { exposed } from "./lighting.js";
+import { isFlat } from "./bounds.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { at, pointer, put } from "../lib/patch.js";
 import { blackMaterial, defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
@@ -16,7 +17,7 @@ import { without } from "./outline.js";
 
 // The shape that the eye goes to: the first which is not flat.
 function subject({ shapes }) {
-  const index = shapes.findIndex(({ type }) => type !== "quad");
+  const index = shapes.findIndex((shape) => !isFlat(shape));
   return Math.max(index, 0);
 }
 

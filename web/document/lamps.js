@@ -1,6 +1,6 @@
 // Lights as a photographer places them: aimed at a subject, from a side where none is yet.
 
-import { ownBox, place } from "./bounds.js";
+import { isFlat, ownBox, place, rimOf } from "./bounds.js";
 import { axes } from "./camera.js";
 import { isLight, mapped, shifted } from "./manipulation.js";
 import { ballOf, middle, union } from "./placing.js";
@@ -46,7 +46,7 @@ function wallAt(shape, from, direction) {
 // What a new light is for: {center, radius, shapes}, the indices of its shapes: the selected thing, or where that is a lamp
 // or none, all things that are neither flat nor lamps; at last what the camera looks at.
 export function subjectOf(scene, thing, camera) {
-  const isBody = (shape) => shape && shape.type !== "quad" && !isLamp(scene, shape) && ownBox(shape);
+  const isBody = (shape) => shape && !isFlat(shape) && !isLamp(scene, shape) && ownBox(shape);
   const chosen = /^\/shapes\//.test(thing) ? Number(thing.split("/")[2]) : -1;
   const shapes = isBody(scene.shapes[chosen])
     ? [chosen]
@@ -91,12 +91,17 @@ export function standOf(scene, camera, { center, radius }) {
   return { position: rounded(add(center, scale(toLight, distance))), toLight, distance };
 }
 
-// A rectangle or a ball that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
+// A rectangle, a disk or a ball that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
 export function lampShape(type, { position, toLight }, { radius }, material) {
   const side = SIDE * radius;
   if (type === "sphere") {
     const own = Number((side / 3).toPrecision(3));
     return { shape: { type, center: position, radius: own, material }, area: Math.PI * own * own };
+  }
+  if (type === "disk") {
+    const own = Number((side / Math.sqrt(Math.PI)).toPrecision(3)); // as large as the rectangle
+    const normal = rounded(scale(toLight, -1));
+    return { shape: { type, center: position, normal, radius: own, material }, area: Math.PI * own * own };
   }
   const flat = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
   const u = scale(flat, side);
@@ -123,14 +128,15 @@ export function positionOf(document) {
 // The unit direction in which a light that has one shines, or null.
 function aimOf(document) {
   if (document.direction) return normalize(document.direction);
-  return document.type === "quad" && !document.transform ? normalize(cross(document.u, document.v)) : null;
+  if (!isFlat(document) || document.transform) return null;
+  return normalize(document.normal ?? cross(document.u, document.v));
 }
 
 // What a light slides round: the body that it is aimed at, else the middle of all.
 export function targetOf(scene, document, camera) {
   const [from, aim] = [positionOf(document), aimOf(document)];
   const bodies = scene.shapes
-    .filter((shape) => shape.type !== "quad" && !isLamp(scene, shape) && ownBox(shape))
+    .filter((shape) => !isFlat(shape) && !isLamp(scene, shape) && ownBox(shape))
     .map((shape) => ballOf(ownBox(shape)));
   const missed = ({ center, radius }) => {
     const way = subtract(center, from);
@@ -182,6 +188,7 @@ export function outlineOf(document) {
   if (isLight(document)) return null;
   const own = ownBox(document);
   if (document.type === "sphere") return own && { center: middle(own), radius: (own.high[0] - own.low[0]) / 2 };
+  if (document.type === "disk") return rimOf(document).map((point) => place(point, document.transform));
   if (document.type !== "quad") return null;
   const { origin, u, v, transform } = document;
   return [origin, add(origin, u), add(add(origin, u), v), add(origin, v)].map((point) => place(point, transform));

@@ -1,8 +1,8 @@
 // A thing of the scene moved, turned or scaled as a whole: a shape or a light, by a linear map about a pivot.
 
-import { place } from "./bounds.js";
+import { diskAxes, place } from "./bounds.js";
 import { moved, parts } from "./transforms.js";
-import { add, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
+import { add, cross, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
 
 const WORLD = [
   [1, 0, 0],
@@ -37,6 +37,15 @@ function composed(transform, map, pivot) {
 
 const isDiagonal = (map) => WORLD.every((axis, k) => map(axis).every((x, i) => i === k || Math.abs(x) < 1e-12));
 
+// The factor of a map that turns, and scales alike in all directions; else 0.
+function similarity(map) {
+  const [x, y, z] = WORLD.map(map);
+  const factor = length(x);
+  const isSquare = [dot(x, y), dot(y, z), dot(z, x)].every((slant) => Math.abs(slant) < 1e-9 * factor * factor);
+  const isEven = [y, z].every((axis) => Math.abs(length(axis) - factor) < 1e-9 * factor);
+  return isSquare && isEven && dot(cross(x, y), z) > 0 ? factor : 0;
+}
+
 // The thing after a map about a pivot. Numbers of its own change where they can say it; else its transform does.
 export function mapped(thing, map, pivot) {
   const to = (point) => tidy(add(pivot, map(subtract(point, pivot))));
@@ -50,6 +59,11 @@ export function mapped(thing, map, pivot) {
   }
   if (!thing.transform && thing.type === "quad") {
     return { ...thing, origin: to(thing.origin), u: tidy(map(thing.u)), v: tidy(map(thing.v)) };
+  }
+  if (!thing.transform && thing.type === "disk" && similarity(map)) {
+    const factor = similarity(map);
+    const radius = Number((thing.radius * factor).toPrecision(7));
+    return { ...thing, center: to(thing.center), normal: tidy(scale(map(thing.normal), 1 / factor)), radius };
   }
   if (!thing.transform && isDiagonal(map)) {
     const factors = WORLD.map((axis, k) => map(axis)[k]);
@@ -69,6 +83,7 @@ export function ownAxes(thing) {
     const [u, v] = [thing.u, thing.v];
     axes = [u, v, [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]];
   }
+  if (thing.type === "disk" && !transform) axes = diskAxes(thing);
   const left = axes.map((axis) => scale(axis, 1 / length(axis)));
   return WORLD.map((_, k) => {
     const at = left.reduce((best, axis, i) => (Math.abs(axis[k]) > Math.abs(left[best][k]) ? i : best), 0);

@@ -1,6 +1,6 @@
 // The picture under the hand: tools, picking, framing, focus, and what lies over it.
 
-import { ball, box, together } from "../document/bounds.js";
+import { ball, box, isFlat, together } from "../document/bounds.js";
 import { axes, frame, ray } from "../document/camera.js";
 import { lampsOf } from "../document/lamps.js";
 import { AxisViews } from "./axis-views.js";
@@ -230,7 +230,7 @@ export class ViewportController {
         ? (ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2]))))
         : together(
             scene.shapes
-              .filter(({ type }) => type !== "quad")
+              .filter((shape) => !isFlat(shape))
               .map(ball)
               .filter(Boolean),
           );
