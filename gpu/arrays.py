@@ -42,10 +42,11 @@ class EnvironmentArrays:
     cube: bool = False
     sun: SunDisk | None = None
     sun_share: float = 0.0
+    key: str = ""  # equal where all but rotation, scale and background are
 
     def has_map_of(self, other: EnvironmentArrays) -> bool:
         """Whether this is the other one, turned or brightened at most: all of their other members are the same."""
-        names = (each.name for each in fields(self) if each.name not in ("rotation", "scale"))
+        names = (each.name for each in fields(self) if each.name not in ("rotation", "scale", "key"))
         return all(getattr(self, name) is getattr(other, name) for name in names)
 
 

@@ -18,6 +18,17 @@ def scene_bytes(scene: SceneArrays) -> int:
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
+def unshared_bytes(scene: SceneArrays) -> int:
+    """About how many of these bytes are the scene's alone, and not in uploads that it shares with others."""
+    shared = 0
+    if scene.environment is not None and scene.environment.key:
+        e = scene.environment
+        shared += e.texels.nbytes + e.probability.nbytes + e.cells.nbytes
+    if scene.textures is not None and scene.textures.key:
+        shared += scene.textures.texels.nbytes + scene.textures.floats.nbytes
+    return scene_bytes(scene) - shared
+
+
 def picture_bytes(settings: RenderSettings, guided: bool = False) -> int:
     """About how many bytes a picture takes on the device at most, with the AOVs of the first hit (`guided`) or
     without. A block of samples takes memory from sample 9 on."""

@@ -12,7 +12,7 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.bsdf.evaluator import BsdfEvaluator
 from gpu.device.scene import Scene
-from gpu.device.textures import TextureCache
+from gpu.device.uploads import SharedUploads
 from gpu.errors import SceneTooLarge, WrongThread
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS
@@ -31,7 +31,7 @@ class Renderer:
         self._thread = threading.get_ident()
         self.context = contexts.create(device)
         self._kernels = KernelCache(self.context, shaders)
-        self._texels = TextureCache()
+        self._shared = SharedUploads()
         self._bsdf = BsdfEvaluator(self.context, self._kernels)
         self._uniform_buffer = self.context.buffer(reserve=layout.Uniforms.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self.context)
@@ -55,7 +55,7 @@ class Renderer:
         """
         self._own()
         _check(arrays)
-        return Scene(self.context, arrays, editing, self._texels, everything, raised)
+        return Scene(self.context, arrays, editing, self._shared, everything, raised)
 
     def load_fallback(self, arrays: SceneArrays, raised: frozenset[str] | None = None) -> Scene:
         """Upload a scene for a kernel of `fallback`, which must be able to show it: the superset kernel with the
@@ -65,7 +65,7 @@ class Renderer:
         """
         self._own()
         _check(arrays)
-        return FallbackScene(self.context, arrays, self._texels, raised)
+        return FallbackScene(self.context, arrays, self._shared, raised)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.
@@ -87,6 +87,11 @@ class Renderer:
         return self._kernels.tidy()
 
     @property
+    def shared_bytes(self) -> int:
+        """About how many bytes of the device scenes take together for what they share."""
+        return self._shared.bytes
+
+    @property
     def kernels(self) -> int:
         """The number of compiled kernels in memory."""
         return len(self._kernels)
@@ -100,7 +105,7 @@ class Renderer:
         """Release the context with all that was made from it."""
         self._own()
         self._kernels.release()
-        self._texels.release()
+        self._shared.release()
         self._bsdf.release()
         self._uniform_buffer.release()
         contexts.release(self.context)

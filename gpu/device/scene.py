@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
+from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +14,10 @@ from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import EnvironmentArrays, SceneArrays
 from gpu.device import buffers
-from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
+from gpu.device.textures import IMAGE_UNITS, KINDS, bound_textures, linear_texture, placeholder
+from gpu.device.uploads import SharedUploads, Taken, Textures
 from gpu.errors import OutOfMemory
+from gpu.footprint import unshared_bytes
 from gpu.kernels import features
 from gpu.layout import LightKind, bindings
 from gpu.layout.bindings import Slot
@@ -29,12 +33,12 @@ _BLOCK_MAX = 16384  # bytes of a uniform block on every driver; of a longer buff
 RADIANCE_MAX = 1e20  # most of a texel times the environment's scale
 
 
-def upload_tables(context: Any) -> dict[int, Any]:
+def upload_tables(context: Any) -> Textures:
     """The tables of `energy` as textures, by unit, linear and clamped: their first axes are folded into the third.
 
     The index of refraction of stretched lobes is folded into the second: a driver need support only 2 048 layers.
     """
-    out = {}
+    out = Textures()
     for name, unit in bindings.ENERGY_TEXTURES.items():
         table = getattr(energy.tables(), name)
         if name == "stretched":
@@ -56,6 +60,7 @@ class _Environment(NamedTuple):
     texels: Any
     cells: Any
     scale_max: float
+    bytes: int
 
     def release(self) -> None:
         self.texels.release()
@@ -74,12 +79,12 @@ class Scene:
         context: Any,
         arrays: SceneArrays,
         editing: bool,
-        texels: TextureCache,
+        shared: SharedUploads,
         everything: bool = False,
         raised: frozenset[str] = frozenset(),
     ) -> None:
         self._context = context
-        self._shared = texels
+        self._shared = shared
         self._editing = editing
         self._everything = everything
         self._raised = raised
@@ -88,16 +93,16 @@ class Scene:
         self._looped = features.looped(arrays)
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
-        self._images: dict[int, Any] = {}  # textures of images, shared among scenes, by unit
-        self._key = ""  # the images' key in the cache of textures
+        self._images: Taken[Textures] | None = None
+        self._lit: Taken[_Environment] | None = None
+        self._tables: Taken[Textures] | None = None
+        self.bytes = unshared_bytes(arrays)  # on the device, without what other scenes have, too
         self.uploaded = 0  # bytes that edits which move shapes have uploaded
         try:
             self._upload_all()
         except OutOfMemory:
-            for thing in (*self._buffers.values(), *self._details.values()):
-                thing.release()
+            self.release()
             raise
-        self._tables = upload_tables(context) if features.needs_tables(self._raised) else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
         log.info("loaded scene", {"shapes": count, "lights": len(arrays.lights), "materials": len(arrays.materials)})
 
@@ -106,7 +111,8 @@ class Scene:
             self._buffers[slot] = buffers.shared(self._context, slot, self.arrays)
         self._buffers[Slot.MATERIALS] = buffers.upload(self._context, self._materials())
         self._upload_details()
-        self._take_environment(self._upload_environment(self.arrays.environment))
+        self._lit = self._take_environment(self.arrays.environment)
+        self._take_tables()
 
     def _materials(self) -> np.ndarray:
         """Bytes of all materials, each followed by its slots and uses of textures."""
@@ -124,16 +130,19 @@ class Scene:
                 self._details[unit] = linear_texture(self._context, values, *KINDS[unit])
         key = self.arrays.textures.key if self.arrays.textures is not None else ""
         images = {unit: values for unit, values in bound.items() if unit in IMAGE_UNITS}
-        if key:
-            self._images, self._key = self._shared.take(key, lambda: self._upload_images(images)), key
-        else:
-            self._images = self._upload_images(images)
+        self._images = self._shared.images.take(key, partial(self._upload_images, images))
         if self._everything:  # its kernels read every unit; another scene's texture may still be bound there
-            missing = KINDS.keys() - self._details.keys() - self._images.keys()
+            missing = KINDS.keys() - self._details.keys() - images.keys()
             self._details |= {unit: placeholder(self._context, unit) for unit in missing}
 
-    def _upload_images(self, images: dict[int, np.ndarray]) -> dict[int, Any]:
-        return {unit: linear_texture(self._context, values, *KINDS[unit]) for unit, values in images.items()}
+    def _upload_images(self, images: dict[int, np.ndarray]) -> Textures:
+        return Textures(
+            {unit: linear_texture(self._context, values, *KINDS[unit]) for unit, values in images.items()}
+        )
+
+    def _take_tables(self) -> None:
+        if features.needs_tables(self._raised) and self._tables is None:
+            self._tables = self._shared.tables.take("energy", partial(upload_tables, self._context))
 
     def _flags(self) -> frozenset[str]:
         """The flags of its kernels, by its arrays and by the flags that it had before."""
@@ -157,11 +166,17 @@ class Scene:
         buffer = buffers.upload(self._context, cells)
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
-        return _Environment(texture, buffer, scale_max)
+        return _Environment(texture, buffer, scale_max, texels.nbytes + buffer.size)
 
-    def _take_environment(self, lit: _Environment) -> None:
-        self._texels, self._scale_max = lit.texels, lit.scale_max
-        self._buffers[Slot.ENVIRONMENT_CELLS] = lit.cells
+    def _take_environment(self, e: EnvironmentArrays | None) -> Taken[_Environment]:
+        """Raises OutOfMemory."""
+        key = "none" if e is None else e.key
+        return self._shared.environments.take(key, partial(self._upload_environment, e))
+
+    @property
+    def _environment(self) -> _Environment:
+        assert self._lit is not None
+        return self._lit.upload
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         """The defines that its kernels are compiled with."""
@@ -193,7 +208,7 @@ class Scene:
             tables = linear_texture(self._context, arrays.microfacets, *KINDS[bindings.MICROFACETS_TEXTURE])
         was, is_ = old.environment, arrays.environment
         if was is not None and is_ is not None and not is_.has_map_of(was):
-            lit = self._upload_environment(is_)
+            lit = self._take_environment(is_)
         try:
             self.uploaded += buffers.move(self._context, old, arrays, self._buffers, self._details)
         except OutOfMemory:
@@ -206,15 +221,16 @@ class Scene:
                 self._details[bindings.MICROFACETS_TEXTURE].release()
             self._details[bindings.MICROFACETS_TEXTURE] = tables
         if lit is not None:
-            _Environment(self._texels, self._buffers[Slot.ENVIRONMENT_CELLS], 0.0).release()
-            self._take_environment(lit)
+            assert self._lit is not None
+            self._lit.release()
+            self._lit = lit
         same_materials = arrays.materials is old.materials and arrays.textures is old.textures
         if len(arrays.materials) and not same_materials:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._looped = features.looped(arrays)
         self._raised = self._flags() if flags is None else flags
-        if features.needs_tables(self._raised) and not self._tables:
-            self._tables = upload_tables(self._context)
+        self._take_tables()
+        self.bytes = unshared_bytes(arrays)
 
     def bind(self) -> None:
         """Bind every buffer of the scene to its slot."""
@@ -222,8 +238,10 @@ class Scene:
             buffer.bind_to_storage_buffer(int(slot))
             if slot in _BLOCKS:
                 buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
-        self._texels.use(bindings.ENVIRONMENT_TEXTURE)
-        for unit, texture in (*self._tables.items(), *self._details.items(), *self._images.items()):
+        self._environment.cells.bind_to_storage_buffer(int(Slot.ENVIRONMENT_CELLS))
+        self._environment.texels.use(bindings.ENVIRONMENT_TEXTURE)
+        shared = [taken.upload for taken in (self._tables, self._images) if taken is not None]
+        for unit, texture in chain(*(textures.items() for textures in (*shared, self._details))):
             texture.use(unit)
 
     def write_uniforms(self, uniforms: np.ndarray) -> None:
@@ -244,7 +262,7 @@ class Scene:
         if a.environment is not None:
             e = a.environment
             uniforms["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
-            uniforms["environment_scale"] = min(e.scale, self._scale_max)
+            uniforms["environment_scale"] = min(e.scale, self._environment.scale_max)
             uniforms["environment_background"] = e.background
             uniforms["environment_cube"] = e.cube
             if e.sun is not None:
@@ -260,9 +278,8 @@ class Scene:
         contexts.use(self._context)
         for buffer in self._buffers.values():
             buffer.release()
-        self._texels.release()
-        own = [] if self._key else self._images.values()
-        for texture in (*self._tables.values(), *self._details.values(), *own):
+        for texture in self._details.values():
             texture.release()
-        if self._key:
-            self._shared.give_back(self._key)
+        for taken in (self._tables, self._images, self._lit):
+            if taken is not None:
+                taken.release()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -100,40 +98,3 @@ def placeholder(context: Any, unit: int) -> Any:
     texture = context.texture((1, 1), channels, bytes(channels * BYTES[dtype]), alignment=1, dtype=dtype)
     texture.filter = (context.NEAREST, context.NEAREST)
     return texture
-
-
-@dataclass
-class _Shared:
-    textures: dict[int, Any]
-    users: int
-
-
-class TextureCache:
-    """Images on the device, by `TextureArrays.key`. The images of the scene that was released last stay, so that an
-    edit that packs the scene anew does not upload them again.
-    """
-
-    def __init__(self) -> None:
-        self._held: dict[str, _Shared] = {}
-
-    def take(self, key: str, make: Callable[[], dict[int, Any]]) -> dict[int, Any]:
-        """The textures by unit; the caller must release them."""
-        held = self._held.get(key)
-        if held is None:
-            held = self._held[key] = _Shared(make(), 0)
-        held.users += 1
-        return held.textures
-
-    def give_back(self, key: str) -> None:
-        self._held[key].users -= 1
-        if self._held[key].users == 0:
-            for other in [k for k, held in self._held.items() if held.users == 0 and k != key]:
-                self._release(other)
-
-    def release(self) -> None:
-        for key in list(self._held):
-            self._release(key)
-
-    def _release(self, key: str) -> None:
-        for texture in self._held.pop(key).textures.values():
-            texture.release()

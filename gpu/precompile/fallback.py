@@ -18,7 +18,7 @@ import numpy as np
 
 from gpu.arrays import SceneArrays
 from gpu.device.scene import Scene
-from gpu.device.textures import TextureCache
+from gpu.device.uploads import SharedUploads
 from gpu.kernels import features
 from gpu.kernels.flag_table import FLAGS, beside
 from gpu.precompile import kernel_keys
@@ -92,10 +92,10 @@ class FallbackScene(Scene):
     """A scene whose pictures are made with such a kernel. Made by `Renderer.load_fallback`."""
 
     def __init__(
-        self, context: Any, arrays: SceneArrays, texels: TextureCache, raised: frozenset[str] | None
+        self, context: Any, arrays: SceneArrays, shared: SharedUploads, raised: frozenset[str] | None
     ) -> None:
         self._superset = raised
-        super().__init__(context, arrays, False, texels)
+        super().__init__(context, arrays, False, shared)
 
     def _flags(self) -> frozenset[str]:
         return flags() if self._superset is None else self._superset

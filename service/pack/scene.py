@@ -113,7 +113,7 @@ def pack(
 def _environment(
     environment: Environment, radius: float, assets: Assets, cache: PackCache | None, shared: PackCache | None
 ) -> _Sky:
-    sky = _packed_environment(environment, assets, cache, shared)
+    sky, key = _packed_environment(environment, assets, cache, shared), environment_key(environment)
     rotation, scale = pack_turn(environment)
     warnings = tuple(sky.warnings)
     if scale * sky.peak > BRIGHTEST:
@@ -121,7 +121,7 @@ def _environment(
         warnings += (f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}",)
     arrays = EnvironmentArrays(
         sky.texels, sky.probability, sky.cells, rotation, scale, environment.background,
-        sky.cube, sky.sun, sky.sun_share,
+        sky.cube, sky.sun, sky.sun_share, key="" if key is None else repr(key),
     )  # fmt: skip
     if scale <= 0:
         return _Sky(arrays, warnings=warnings)

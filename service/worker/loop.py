@@ -65,7 +65,11 @@ class Loop:
         self._tasks: dict[int, Task] = {}
         self._questions: dict[int, BsdfTask] = {}
         self._assistants: dict[int, Assistant] = {}  # of tasks whose home is elsewhere
-        self._memory = Memory(memory_limit, lambda: [*self._tasks.values(), *self._assistants.values()])
+        self._memory = Memory(
+            memory_limit,
+            lambda: [*self._tasks.values(), *self._assistants.values()],
+            lambda: renderer.shared_bytes,
+        )
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
         self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline)

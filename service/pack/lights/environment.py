@@ -25,6 +25,7 @@ from service.scene.environment import (
     SkyEnvironment,
 )
 from service.scene.numbers import BRIGHTEST
+from service.system.shared_memory import SharedArena
 
 LARGEST_SIDE = 16384  # texels; no driver promises larger textures
 LARGEST_FACE = LARGEST_SIDE // 3  # they share one texture, three across
@@ -121,7 +122,7 @@ def _cube(faces: CubeFaces, assets: Assets, blur: float) -> PackedEnvironment:
     if blur:
         return _packed(blur_cube(list(parts), blur), sum(warnings, ()))
     texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)
-    probability, cells = cube_tables(texels)
+    texels, probability, cells = _in_one_block(texels, *cube_tables(texels))
     solid = np.tile(cube_solid_angles(wanted), (2, 3))
     irradiance = float(((texels @ LUMINANCE) * solid).sum())
     peak = min(float(texels.max()), BRIGHTEST)
@@ -168,8 +169,14 @@ def _clamped(image: ImageData, pointer: str) -> tuple[np.ndarray, tuple[str, ...
 
 def _packed(texels: np.ndarray, warnings: tuple[str, ...]) -> PackedEnvironment:
     texels = np.ascontiguousarray(texels, np.float32)
-    probability, cells = environment_tables(texels)
+    texels, probability, cells = _in_one_block(texels, *environment_tables(texels))
     height, width = texels.shape[:2]
     rows = (texels @ LUMINANCE).sum(axis=1, dtype=np.float64)
     irradiance = float(rows @ solid_angles(height, width))
     return PackedEnvironment(texels, probability, cells, irradiance, min(float(texels.max()), BRIGHTEST), warnings)
+
+
+def _in_one_block(*arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The same arrays where the renderer can map them: each scene that is sent to it has the environment again."""
+    arena = SharedArena(*(array.nbytes for array in arrays))
+    return tuple(map(arena.put, arrays))

@@ -61,7 +61,7 @@ class LoadedScene:
 
     @property
     def bytes(self) -> int:
-        return scene_bytes(self.scene.arrays) + self.ladder.bytes
+        return self.scene.bytes + self.ladder.bytes
 
     def resize(self, settings: RenderSettings) -> None:
         """Change to settings of another size; where there is no memory for it, the old pictures stay."""

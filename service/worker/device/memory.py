@@ -32,13 +32,16 @@ class Holder(Protocol):
 class Memory:
     """Counts the bytes that were requested from the driver, which does not say what it really takes."""
 
-    def __init__(self, limit: int, holders: Callable[[], Iterable[Holder]]) -> None:
+    def __init__(
+        self, limit: int, holders: Callable[[], Iterable[Holder]], shared: Callable[[], int] = lambda: 0
+    ) -> None:
+        """`shared`: the bytes of what several holders have together."""
         self.limit = limit
-        self._holders = holders
+        self._holders, self._shared = holders, shared
 
     @property
     def used(self) -> int:
-        return sum(holder.bytes for holder in self._holders())
+        return self._shared() + sum(holder.bytes for holder in self._holders())
 
     def make_room(self, needed: int, asking: Holder) -> None:
         """Evict idle tasks, the longest at rest first, until that many bytes fit. Raises OutOfMemory."""

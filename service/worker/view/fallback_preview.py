@@ -72,7 +72,7 @@ class FallbackPreview:
     def bytes(self) -> int:
         if self._scene is None or self._ladder is None:
             return 0
-        return scene_bytes(self._scene.arrays) + self._ladder.bytes
+        return self._scene.bytes + self._ladder.bytes
 
     @property
     def due(self) -> bool:
