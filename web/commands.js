@@ -1,5 +1,6 @@
 // The commands of the buttons and the keys: what each one does, and which keys give it.
 
+import { OnDemand } from "./lib/on-demand.js";
 import { compared } from "./document/variants.js";
 
 // The copied material: the browser's clipboard where the page may read it, else one of the page's own.
@@ -22,7 +23,7 @@ class Clipboard {
   }
 }
 
-// {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
+// {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState; `later` has the parts on demand; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
 export function makeCommands({
   find,
   page,
@@ -31,16 +32,19 @@ export function makeCommands({
   stream,
   controller,
   panel,
-  importer,
-  sceneMenu,
-  exportMenu,
-  finals,
+  later,
   complain,
   say,
   refresh,
   push,
 }) {
   const clipboard = new Clipboard();
+  const { importer, menus, finals } = later;
+  const keySheet = new OnDemand(
+    () => import("./keys-sheet.js"),
+    ({ fillSheet }) => fillSheet(find("keys"), keyTable(does)),
+    { complain },
+  );
 
   // Words about what was refused belong to a state that is left.
   const travel = (step) => {
@@ -74,7 +78,7 @@ export function makeCommands({
     remove: () => {
       if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing);
     },
-    land: () => controller.handles.land(),
+    land: async () => (await controller.tools.get()).handles.land(),
     copyMaterial() {
       clipboard.write(editor.materialSet);
       say("Material copied");
@@ -83,22 +87,22 @@ export function makeCommands({
     async pasteMaterial() {
       try {
         const { pasted, own } = await clipboard.read();
-        if (pasted) importer.openDocument(pasted, "pasted");
+        if (pasted) (await importer.get()).openDocument(pasted, "pasted");
         else if (own) editor.putMaterial(own);
       } catch (error) {
         complain(error);
       }
     },
     resetMaterial: () => editor.putMaterial({ type: editor.material.type }),
-    openFiles: () => importer.browse("open"),
-    addFiles: () => importer.browse("add"),
-    snapshot: () => sceneMenu.snapshot(),
+    openFiles: () => importer.calls("browse")("open"),
+    addFiles: () => importer.calls("browse")("add"),
+    snapshot: () => menus.get().then(({ sceneMenu }) => sceneMenu.snapshot(), complain),
     frame: () => controller.frame(),
     resetView: () => editor.resetView(),
-    showKeys: () => find("keys-dialog").showModal(),
+    showKeys: () => keySheet.get().then(() => find("keys-dialog").showModal(), complain),
     toggleOutline: () => find("toggle-outline").click(),
-    renderPicture: () => finals.render(),
-    download: () => exportMenu.png(),
+    renderPicture: finals.calls("render"),
+    download: () => menus.get().then(({ exportMenu }) => exportMenu.png(), complain),
   };
   return {
     does,

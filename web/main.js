@@ -1,37 +1,32 @@
 // Composes the page. State flows one way: control -> editor -> stream -> frame -> viewport.
 
-import { Adder } from "./adding.js";
 import { boot } from "./boot.js";
 import { keyTable, makeCommands, watchButtons } from "./commands.js";
-import { Comparison } from "./picture/compare.js";
 import { DisplayControls } from "./panels/display-controls.js";
 import { Editor } from "./document/editor.js";
 import { learnNames, sentence } from "./lib/format-text.js";
+import { watchDrops } from "./lib/drops.js";
 import { Frame } from "./panels/frame.js";
-import { Importer, watchDrops } from "./importer.js";
-import { makeHeader } from "./header.js";
 import { askForKey } from "./server/key.js";
-import { FinalPictures } from "./renders/final-pictures.js";
-import { fillSheet, watchKeys } from "./keys.js";
+import { watchKeys } from "./keys.js";
+import { laterParts } from "./later.js";
 import { LobeOnDemand } from "./lobe/on-demand.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
 import { entire, visible } from "./document/outline.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
-import { pictureRecipes } from "./picture/picture-recipe.js";
 import { Preparing } from "./panels/preparing.js";
 import { detailWords, fieldTitles, problemText } from "./server/problem-text.js";
 import { offerUndo } from "./panels/replaced.js";
 import { SavedMaterials } from "./panels/saved-materials.js";
-import { blackMaterial, materialModels, modelNames } from "./server/schema.js";
+import { modelNames } from "./server/schema.js";
 import { essence } from "./document/share.js";
 import { sceneOfB } from "./document/variants.js";
 import { Shelf } from "./panels/shelf.js";
 import { Status } from "./panels/status.js";
 import { Stream } from "./server/stream.js";
 import { textureActs } from "./forms/texture-slot.js";
-import { TextureThumbnails } from "./forms/texture-thumbnails.js";
 import { Thumbnails } from "./forms/thumbnails.js";
 import { UiState } from "./document/ui-state.js";
 import { Viewport } from "./picture/viewport.js";
@@ -40,6 +35,7 @@ import { forgetWork, keepWork } from "./document/work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
 const SAVE_REST_MS = 600;
+const PATIENCE_MS = 3000;
 
 const find = (id) => document.getElementById(id);
 const root = find("stage");
@@ -75,16 +71,7 @@ learnNames(modelNames(schema.scene));
 titles = fieldTitles(schema.scene, schema.settings, schema.view);
 editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal"), waits: tellState });
 if (left) editor.amend(left.state);
-const page = new PageState({ schema, editor, ui, root, fit: (box) => comparison.fit(box) });
-
-const recipes = pictureRecipes({
-  schema,
-  acts: editor,
-  info: () => page.info,
-  size: () => page.size,
-  view: () => page.view,
-  viewDefaults: page.viewDefaults,
-});
+const page = new PageState({ schema, editor, ui, root, fit: (box) => later.comparison.now?.fit(box) ?? box });
 
 // The name of a scene in words.
 const titleOf = ({ scene: own }) => library.scenes.find(({ name: each }) => each === own)?.title ?? own;
@@ -92,17 +79,29 @@ const sceneTitle = () => titleOf(editor.state.chosen) || "Your own scene";
 
 // --- the picture ---
 
+// What the first picture does not need waits for it, but not for a compiler.
+let begin = () => {};
+const begun = new Promise((resolve) => {
+  begin = resolve;
+  setTimeout(resolve, PATIENCE_MS);
+});
+
 const viewport = new Viewport(find("picture"), {
   names: (aov) => namesOf(aov, stream.document),
   painted(frame) {
+    const isFirst = !page.header;
     root.classList.add("live");
     page.paint(frame);
     preparing.end();
     status.frame(frame.header, page.limit);
     controller.painted(frame);
-    comparison.painted();
-    if (ui.state.tab === "render") finals.show();
+    comparison.now?.painted();
+    if (ui.state.tab === "render") finals.now?.show();
     tellState();
+    if (!isFirst) return;
+    performance.mark("first picture");
+    begin();
+    later.prepare();
   },
 });
 
@@ -113,13 +112,13 @@ const stream = new Stream({
     messages.hide("refusal");
     find("renderer").textContent = info.renderer?.renderer ?? "";
     viewport.restart();
-    if (!isTakenUp) controller.picker.forget();
+    if (!isTakenUp) controller.forget();
     refresh();
   },
   frame: (frame, bytes, view, acknowledge) => viewport.show(frame, bytes, view, acknowledge),
   waiting(isWaiting) {
     page.isWaiting = isWaiting;
-    if (isWaiting) controller.inspector.forget();
+    if (isWaiting) controller.awaited();
     preparing.wait(isWaiting);
     tellState();
   },
@@ -169,53 +168,44 @@ const preparing = new Preparing({
 });
 
 const controller = new ViewportController({ find, acts: editor, ui, stream, viewport, complain, say });
-const comparison = new Comparison(
-  {
-    root: find("comparison"),
-    stage: root,
-    divider: find("divider"),
-    canvas: find("picture-b"),
-    difference: find("difference"),
-  },
-  {
-    first: viewport,
-    acts: editor,
-    models: Object.keys(materialModels(schema.scene)),
-    names: namesOf,
-    lost: () => {},
-    beside: () => stream.session,
-    headerOfA: () => page.header,
-  },
-);
+const later = laterParts({
+  find,
+  schema,
+  page,
+  editor,
+  ui,
+  stream,
+  viewport,
+  controller,
+  messages,
+  titleOf,
+  push,
+  complain,
+  say,
+});
+const { adder, comparison, finals, importer, textures } = later;
 
 // --- the panel ---
 
-const thumbnails = new Thumbnails(() => page.isConnected && (page.isDone || page.isPaused));
-const textureThumbnails = new TextureThumbnails(blackMaterial(schema.scene));
-const adder = new Adder({ acts: editor, controller });
-const importer = new Importer({
-  schema,
-  acts: editor,
-  adder,
-  messages,
-  controller,
-  reopen: recipes.reopen,
-  thumbnails: textureThumbnails,
-});
+const thumbnails = new Thumbnails(() => page.isConnected && (page.isDone || page.isPaused), begun);
 const panel = new Panel(find, {
   schema,
   library,
   acts: editor,
   stage: {
     frame: (thing) => controller.frame(thing),
-    duplicate: (thing) => adder.duplicate(thing),
-    takeTexture: (place, file) => importer.texture(place, file),
+    duplicate: adder.calls("duplicate"),
+    takeTexture: importer.calls("texture"),
   },
   paint: (image, material) => thumbnails.own(image, material),
   say,
-  textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
+  textureActs: textureActs({
+    editor,
+    importer: { texture: importer.calls("texture") },
+    thumbnails: { paint: textures.calls("paint") },
+  }),
 });
-const outliner = new Outliner(find, { schema: schema.scene, acts: editor, add: (offer) => adder.add(offer), say });
+const outliner = new Outliner(find, { schema: schema.scene, acts: editor, add: adder.calls("add"), say });
 const frame = new Frame(find, ui);
 
 // --- the shelf ---
@@ -230,7 +220,7 @@ const shelf = new Shelf(find, {
     stage: root,
     outline: find("outline-list"),
     shapeAt: (x, y) => controller.shapeAt(x, y),
-    prepare: () => controller.picker.layer("shape_id", editor.steady.scene).catch(() => {}),
+    prepare: () => controller.prepare().catch(() => {}),
     say,
   },
   rename: (material) => panel.materialPanel.rename(material),
@@ -238,43 +228,15 @@ const shelf = new Shelf(find, {
 });
 find("save-material").addEventListener("click", () => saved.save());
 
-const { sceneMenu, exportMenu } = makeHeader({
-  find,
-  page,
-  editor,
-  stream,
-  recipes,
-  messages,
-  titleOf,
-  openFiles: () => commands.does.openFiles(),
-  addFiles: () => commands.does.addFiles(),
-  complain,
-  say,
-});
-
 const lobe = new LobeOnDemand(find("lobe"), {
   acts: editor,
   schema,
   titles,
-  mean: (texture, reads) => textureThumbnails.mean(texture, reads),
+  mean: textures.calls("mean"),
   close: () => ui.set({ lobe: false }),
   complain,
 });
 for (const near of ["pointerenter", "focus"]) find("show-lobe").addEventListener(near, () => lobe.prepare());
-
-const finals = new FinalPictures({
-  find,
-  schema,
-  page,
-  editor,
-  ui,
-  messages,
-  recipes,
-  title: sceneTitle,
-  compareWith: comparison.compareWith ? (render) => comparison.compareWith(render) : null,
-  complain,
-  say,
-});
 
 const commands = makeCommands({
   find,
@@ -284,10 +246,7 @@ const commands = makeCommands({
   stream,
   controller,
   panel,
-  importer,
-  sceneMenu,
-  exportMenu,
-  finals,
+  later,
   complain,
   say,
   refresh,
@@ -296,11 +255,10 @@ const commands = makeCommands({
 const keys = keyTable(commands.does);
 watchButtons(find, commands.does);
 watchKeys(controller.keyMove, keys);
-fillSheet(find("keys"), keys);
 const display = new DisplayControls({ find, page, ui, does: commands.does });
 
 watchDrops(document, {
-  take: (files, at) => importer.take(files, { at }),
+  take: (files, at) => importer.calls("take")(files, { at }),
   tell(text) {
     find("drop").hidden = text === null;
     find("drop-hint").textContent = text ?? "";
@@ -320,8 +278,10 @@ function push() {
   if (!page.info) return;
   const sceneB = sceneOfB(editor.state);
   const { wanted } = page;
-  comparison.show(sceneB && { ...wanted, scene: visible(sceneB, editor.state.chosen.hidden) }, page.isPaused);
+  if (sceneB && !comparison.now) comparison.get().catch(complain);
+  comparison.now?.show(sceneB && { ...wanted, scene: visible(sceneB, editor.state.chosen.hidden) }, page.isPaused);
   stream.show(wanted);
+  root.style.setProperty("--ratio", String(wanted.settings.width / wanted.settings.height));
   root.classList.toggle("checker", page.isCheckered);
   find("compare").setAttribute("aria-pressed", String(sceneB !== null));
   tellState();
@@ -334,7 +294,7 @@ function refresh() {
   outliner.show(editor.state);
   shelf.show(editor.state);
   find("scene-title").textContent = sceneTitle();
-  if (page.info) finals.show();
+  if (page.info) finals.now?.show();
   find("undo").disabled = !editor.canUndo;
   find("redo").disabled = !editor.canRedo;
   find("paste-material").disabled = !commands.canPaste;
@@ -353,6 +313,7 @@ function showUi() {
   find("show-lobe").setAttribute("aria-pressed", String(ui.state.lobe));
   lobe.refresh();
   controller.showUi(ui.state);
+  if (ui.state.tab === "render" || ui.state.drawer === "renders") finals.get().catch(complain);
   push();
 }
 
@@ -365,8 +326,7 @@ new ResizeObserver(() => {
   clearTimeout(resizing);
   resizing = setTimeout(() => {
     push();
-    controller.overlay();
-    controller.mark();
+    controller.resized();
   }, RESIZE_REST_MS);
 }).observe(root);
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from playwright.sync_api import BrowserContext
+import pytest
+from playwright.sync_api import Browser
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -10,25 +11,38 @@ from tests.web.conftest import Editor
 # The browser's own account of each answer, compressed and with its headers.
 WATCH = "performance.setResourceTimingBufferSize(2000)"
 LOADED = """() => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")].map(
-    ({ name, transferSize }) => ({ name, bytes: transferSize })
+    ({ name, transferSize, startTime }) => ({ name, bytes: transferSize, at: startTime })
 )"""
+FIRST_PICTURE = """performance.getEntriesByName("first picture")[0].startTime"""
+MOST_BEFORE_THE_PICTURE = 200_000
 MOST = 300_000
+# What a hand needs only once there is a picture, one file of each part.
+LATER = ("compare.js", "final-pictures.js", "importer.js", "adding.js", "header.js", "tools.js", "renders.css")
 
 
-def test_a_first_visit_is_light(context: BrowserContext, server: Server) -> None:
+@pytest.mark.usefixtures("editor")  # after that the server has its kernel: this visit waits for the network alone
+def test_a_first_visit_is_light(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=0.5)
     editor = Editor(context.new_page())
     editor.page.add_init_script(WATCH)
     editor.open(server.url, "")
     editor.rest("the last answer", lambda: len(editor.requests))
     answers = editor.page.evaluate(LOADED)
+    shown = editor.page.evaluate(FIRST_PICTURE)
     names = [answer["name"] for answer in answers]
     heaviest = sorted(((answer["bytes"], answer["name"]) for answer in answers), reverse=True)[:12]
+    before = [answer for answer in answers if answer["at"] < shown]
+    assert sum(answer["bytes"] for answer in before) <= MOST_BEFORE_THE_PICTURE, heaviest
     assert sum(answer["bytes"] for answer in answers) <= MOST, heaviest
     assert all(answer["bytes"] > 0 for answer in answers), "nothing came from a cache"
     assert len(names) == len(set(names)), "nothing is fetched twice"
-    unasked = ("/openapi.json", "/lobe/panel.js")
+    unasked = ("/openapi.json", "/lobe/panel.js", "/lobe.css")
     assert not [name for name in names if name.endswith(unasked)], "nobody asked for these"
+    early = {answer["name"].rsplit("/", 1)[-1] for answer in before}
+    late = {name.rsplit("/", 1)[-1] for name in names} - early
+    assert late >= set(LATER), "what the first picture does not need comes after it, without being asked for"
     assert editor.complaints == []
+    context.close()
 
 
 def test_the_lobe_comes_when_a_hand_comes_near_its_button(editor: Editor) -> None:

@@ -2,6 +2,7 @@
 
 import { isFlat, ownBox, place, rimOf } from "./bounds.js";
 import { axes } from "./camera.js";
+import { isLamp } from "./emission.js";
 import { isLight, mapped, shifted } from "./manipulation.js";
 import { ballOf, middle, union } from "./placing.js";
 import { add, cross, dot, length, normalize, scale, subtract, tidy, turn } from "../lib/vector.js";
@@ -22,10 +23,6 @@ const BEFORE = 0.85; // of the way to a wall that is in between
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 const rounded = (v) => v.map((x) => Number(x.toPrecision(4)) + 0);
-const brightest = (value) => (Array.isArray(value) ? Math.max(...value) : value);
-
-// Whether a shape of the scene emits light.
-export const isLamp = ({ materials }, { material }) => brightest(materials[material]?.emission) > 0;
 
 // How far along a ray from a point a flat shape is met, or Infinity.
 function wallAt(shape, from, direction) {

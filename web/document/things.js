@@ -1,6 +1,6 @@
 // What a scene consists of, in the order in which a list shows it.
 
-import { isLamp } from "./lamps.js";
+import { isLamp } from "./emission.js";
 import { inWords } from "../lib/format-text.js";
 import { pointer } from "../lib/patch.js";
 

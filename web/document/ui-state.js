@@ -2,6 +2,7 @@
 // It is neither undone nor shared; how the page is laid out outlives it.
 
 const STORED = "sunbox.ui";
+export const HANDLED = ["move", "rotate", "scale"]; // the tools that put handles on the selection
 const LASTING = ["drawer", "theme", "lobe", "outline", "inspector"];
 
 export class UiState {

@@ -1,7 +1,6 @@
 // The place for an image beside a parameter: a button that offers the scene's textures, a file or a checker, and a
 // chip with the texture's picture while there is one.
 
-import { question } from "../lib/ask.js";
 import { element } from "../lib/dom.js";
 import { accepted, browse } from "../lib/files.js";
 import { isObject } from "../lib/patch.js";
@@ -103,6 +102,7 @@ export class TextureSlot {
   }
 
   async #choose() {
+    const { question } = await import("../lib/ask.js");
     const { acts, field } = this;
     const scene = acts.scene();
     const textures = Object.entries(scene.textures ?? {}).map(([name, texture]) => {

@@ -68,9 +68,9 @@ export class Thumbnails {
   #scene = null;
   #index = null;
 
-  // `isIdle()`: the server has nothing better to do.
-  constructor(isIdle) {
-    this.isIdle = isIdle;
+  // `isIdle()`: the server has nothing better to do; `ready` resolves when the network has not.
+  constructor(isIdle, ready) {
+    Object.assign(this, { isIdle, ready });
   }
 
   // The picture of a material preset, or of what `get` gives where there is none.
@@ -90,6 +90,7 @@ export class Thumbnails {
   }
 
   async #has(kind, name) {
+    await this.ready;
     this.#index ??= fetch(beside("index.json"))
       .then((answer) => answer.json())
       .catch(() => ({}));

@@ -3,7 +3,6 @@
 import { wrapped } from "../document/manipulation.js";
 import { element } from "../lib/dom.js";
 import { watchDrags } from "../lib/drag.js";
-import { ballsOf, drawBall } from "../picture/environment-ball.js";
 
 const STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 15, PageDown: -15 };
 const SNAP = 15; // degrees, with Ctrl
@@ -81,6 +80,7 @@ export class EnvironmentPart {
 
   async #draw(environment, degrees) {
     try {
+      const { ballsOf, drawBall } = await import("../picture/environment-ball.js");
       const balls = await ballsOf(environment);
       const isLate = environment !== this.#environment;
       const isDone = this.#drawn?.balls === balls && this.#drawn.degrees === degrees;

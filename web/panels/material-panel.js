@@ -1,11 +1,9 @@
 // The buttons around the list of the scene's materials, and the line that says what is made of the one in hand.
 
-import { askWhich } from "../lib/ask.js";
 import { pictured } from "../document/material-set.js";
 import * as materials from "../document/materials.js";
 import { things } from "../document/things.js";
 import { watchMenu } from "../lib/menu.js";
-import { nameInPlace } from "../lib/name-entry.js";
 import { pointer } from "../lib/patch.js";
 import { watchToolbar } from "../lib/tabs.js";
 import { sentence } from "../lib/format-text.js";
@@ -47,6 +45,7 @@ export class MaterialPanel {
 
   // Where its name stands on the shelf, else in the inspector.
   async rename(from, at = this.#tile(from) ?? this.find("material-name")) {
+    const { nameInPlace } = await import("../lib/name-entry.js");
     const to = await nameInPlace(at, {
       label: `Name of ${from}`,
       value: from,
@@ -65,6 +64,7 @@ export class MaterialPanel {
   }
 
   async remove(name) {
+    const { askWhich } = await import("../lib/ask.js");
     const { scene } = this.acts.state;
     if (Object.keys(scene.materials).length < 2) return;
     const others = Object.keys(scene.materials).filter((each) => each !== name);

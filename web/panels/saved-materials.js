@@ -1,8 +1,8 @@
 // Materials that users have saved on the server.
 
 import * as api from "../server/api.js";
-import { ask, askName } from "../lib/ask.js";
-import { WHOSE } from "./scene-menu.js";
+
+export const WHOSE = "Everybody who uses this server has it, and this cannot be undone.";
 
 export class SavedMaterials {
   entries = []; // {name, title}
@@ -37,6 +37,7 @@ export class SavedMaterials {
   // Asks for a name, and saves the material in hand.
   save() {
     return this.#try(async () => {
+      const { ask, askName } = await import("../lib/ask.js");
       const { materialSet, state } = this.acts;
       const wanted = await askName({
         title: "Save the material on the server",
@@ -56,6 +57,7 @@ export class SavedMaterials {
 
   forget(name) {
     return this.#try(async () => {
+      const { ask } = await import("../lib/ask.js");
       const { title } = this.entries.find((each) => each.name === name);
       if (!(await ask({ title: `Delete “${title}”?`, detail: WHOSE, yes: "Delete" }))) return;
       await api.forget("materials", name);

@@ -3,10 +3,10 @@
 import * as api from "../server/api.js";
 import { ask } from "../lib/ask.js";
 import { element, freshId } from "../lib/dom.js";
+import { WHOSE } from "./saved-materials.js";
 import { dismiss, recallAll, remember } from "../lib/browser-storage.js";
 
 const SNAPSHOT = "snapshot ";
-export const WHOSE = "Everybody who uses this server has it, and this cannot be undone.";
 
 const button = (label, does, more = {}) =>
   element("button", { type: "button", class: "button small", onclick: does, ...more }, label);

@@ -1,8 +1,8 @@
 // The selected thing: which fields it has, where it stands, and what can be done with it.
 
-import { EnvironmentPart } from "./environment-part.js";
 import { element } from "../lib/dom.js";
 import { added } from "../document/materials.js";
+import { OnDemand } from "../lib/on-demand.js";
 import { at } from "../lib/patch.js";
 import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
@@ -18,7 +18,11 @@ export class ThingPart {
   constructor(find, { schema, acts, stage, environments }) {
     Object.assign(this, { schema, acts, stage, environments });
     this.#find = find;
-    this.environmentPart = new EnvironmentPart(find("environment-ball"), acts);
+    this.environmentPart = new OnDemand(
+      () => import("./environment-part.js"),
+      ({ EnvironmentPart }) => new EnvironmentPart(find("environment-ball"), acts),
+      { complain: (problem) => acts.complain(problem), arrived: (part) => part.show(this.environment) },
+    );
     find("thing-material").addEventListener("change", ({ target }) => {
       if (target.selectedOptions[0] === this.#newMaterial)
         return acts.change(added(acts.state, "material", acts.plainMaterial));
@@ -40,7 +44,10 @@ export class ThingPart {
     this.#find("material-part").hidden = Boolean(own) && !this.thing.startsWith("/shapes/");
     if (own) this.#showThing(scene, own);
     else this.#made = null;
-    this.environmentPart.show(this.thing === "/environment" ? (scene.environment ?? null) : null);
+    this.environment = this.thing === "/environment" ? (scene.environment ?? null) : null;
+    if (this.environment && !this.environmentPart.now)
+      this.environmentPart.get().catch(this.environmentPart.complain);
+    this.environmentPart.now?.show(this.environment);
     const { environment } = chosen;
     const name = this.environments.find((each) => each.name === environment)?.title;
     this.#find("environment-name").textContent =

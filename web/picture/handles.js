@@ -16,13 +16,12 @@ import {
   wrapped,
 } from "../document/manipulation.js";
 import { middle } from "../document/placing.js";
+import { HANDLED } from "../document/ui-state.js";
 import { watchDrags } from "../lib/drag.js";
 import { at } from "../lib/patch.js";
 import { add, scale, subtract } from "../lib/vector.js";
 import { NAMES, WORLD, metresPerPixel, moving, rotating, scaling } from "./handle-drags.js";
 import { drawHandles } from "./handle-shapes.js";
-
-export const HANDLED = ["move", "rotate", "scale"];
 
 const SNAP_PX = 8; // from the ground, within which a thing that is moved is set down on it
 const TURN = 15; // degrees: the steps of a turn with Ctrl

@@ -1,23 +1,11 @@
-// The picture under the hand: tools, picking, framing, focus, and what lies over it.
+// The picture under the hand: gestures, keys, and the tools, whose code comes once there is a picture.
 
-import { ball, box, isFlat, together } from "../document/bounds.js";
-import { axes, frame, ray } from "../document/camera.js";
-import { lampsOf } from "../document/lamps.js";
-import { AxisViews } from "./axis-views.js";
+import { axes, frame } from "../document/camera.js";
 import { watchGestures } from "./gestures.js";
-import { HANDLED, Handles } from "./handles.js";
-import { placeHighlight } from "./highlight-tool.js";
-import { Inspector } from "./inspector.js";
-import { irradianceFor } from "./light-there.js";
-import { Markers } from "./markers.js";
-import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
-import { Picker, drawOutline } from "../document/picking.js";
 import { NotReady } from "../server/stream.js";
 import { watchToolbar } from "../lib/tabs.js";
-import { isOn } from "../document/outline.js";
-import { at, pointer } from "../lib/patch.js";
-import { dot } from "../lib/vector.js";
-import { inWords } from "../lib/format-text.js";
+import { OnDemand } from "../lib/on-demand.js";
+import { HANDLED } from "../document/ui-state.js";
 
 // A click before there is a picture.
 const EARLY = {
@@ -26,56 +14,47 @@ const EARLY = {
   select: "Nothing can be selected in the picture yet: it is still being prepared. The outline has everything.",
 };
 
-const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
-const OVERLAY_MS = 200; // between two histograms
-const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
-
 export class ViewportController {
-  #outlined = {}; // what the outline was drawn of: it stays while that is so
-  #overlaid = 0;
-  #timer = null;
+  #frame = {}; // the newest one on the canvas
 
   // `find(id)` elements, `acts` the editor, `ui`, `stream`, `viewport`; `say(text)`, `complain(error)`.
   constructor(parts) {
     Object.assign(this, parts);
-    const { find, stream, viewport, acts, ui } = parts;
+    const { find, acts, ui } = parts;
     this.root = find("stage");
-    this.picker = new Picker(stream);
-    this.inspector = new Inspector(
-      { stage: this.root, sheet: find("sheet"), probe: find("probe"), crosshair: find("crosshair") },
-      viewport,
-      stream,
+    this.tools = new OnDemand(
+      () => import("./tools.js"),
+      ({ Tools }) => new Tools(this),
+      {
+        complain: parts.complain,
+        arrived: (tools) => {
+          tools.painted(this.#frame);
+          this.showUi(ui.state);
+        },
+      },
     );
-    this.markers = new Markers(find("markers"), acts, parts.say);
-    this.axisViews = new AxisViews(find("axis-views"), acts, parts.say);
-    this.handles = new Handles(find("handles"), {
-      acts,
-      tool: () => ui.state.tool,
-      cloud: (shape) => this.picker.cloud(acts.state.scene, acts.camera, shape),
-      say: parts.say,
-    });
     this.move = {
       ...acts.moves,
-      zoom: (factor, x, y) =>
-        this.inspector.active ? this.inspector.magnify(1 / factor, x, y) : acts.moves.zoom(factor),
-      slide: (right, down) => this.inspector.slide(right, down),
-      hover: (x, y) => {
-        if (this.inspector.active) this.inspector.hover(x, y);
-      },
+      zoom: (factor, x, y) => (this.#glass ? this.#glass.magnify(1 / factor, x, y) : acts.moves.zoom(factor)),
+      slide: (right, down) => this.#glass?.slide(right, down),
+      hover: (x, y) => this.#glass?.hover(x, y),
       tap: (x, y, isAlt) => this.tap(x, y, isAlt),
     };
     // The arrows move the cross, or change the selection, where that is the tool.
     const stepped = (steps, orElse) => (right, down) => {
-      if (this.inspector.active) this.inspector.step(steps * Math.sign(right), steps * Math.sign(down));
-      else if (this.handles.isActive) this.handles.step(steps * Math.sign(right), -steps * Math.sign(down), 0);
+      if (this.#glass) this.#glass.step(steps * Math.sign(right), steps * Math.sign(down));
+      else if (this.#handles) this.#handles.step(steps * Math.sign(right), -steps * Math.sign(down), 0);
       else orElse(right, down);
     };
+    // A tool that was picked early has its keys as soon as it is there.
+    const isAwaited = () => !this.tools.now && ["inspect", ...HANDLED].includes(ui.state.tool);
+    const once = (act) => (isAwaited() ? this.tools.get().then(act, parts.complain) : act());
     this.keyMove = {
       ...this.move,
-      orbit: stepped(1, acts.moves.orbit),
-      pan: stepped(10, acts.moves.pan),
-      isHandling: () => this.handles.isActive,
-      lift: (steps) => this.handles.step(0, 0, steps),
+      orbit: (right, down) => once(() => stepped(1, acts.moves.orbit)(right, down)),
+      pan: (right, down) => once(() => stepped(10, acts.moves.pan)(right, down)),
+      isHandling: () => this.#handles !== null || isAwaited(),
+      lift: (steps) => once(() => this.#handles?.step(0, 0, steps)),
     };
     watchGestures(this.root, this.move, () => ui.state.tool);
     watchToolbar(find("tools"));
@@ -85,6 +64,17 @@ export class ViewportController {
       ui.set({ tool });
       if (HANDLED.includes(tool)) this.root.focus(); // where the arrows are the tool's
     });
+  }
+
+  // The glass and the handles while they are in the hand, else null.
+  get #glass() {
+    const { inspector } = this.tools.now ?? {};
+    return inspector?.active ? inspector : null;
+  }
+
+  get #handles() {
+    const { handles } = this.tools.now ?? {};
+    return handles?.isActive ? handles : null;
   }
 
   get aspect() {
@@ -99,57 +89,41 @@ export class ViewportController {
     return Number(size.toPrecision(2));
   }
 
-  showUi({ tool, guides, clipping, histogram }) {
+  showUi(state) {
+    const { tool } = state;
     this.root.dataset.tool = tool;
     for (const button of this.find("tools").querySelectorAll("[data-tool]"))
       button.setAttribute("aria-pressed", String(button.dataset.tool === tool));
-    this.inspector.toggle(tool === "inspect");
-    this.find("guides").hidden = !guides;
-    this.find("clipping").hidden = !clipping;
-    this.find("clipped").hidden = !clipping;
-    this.find("histogram").hidden = !histogram;
-    this.overlay();
+    if (tool !== "orbit" && !this.tools.now) this.tools.get().catch(this.complain);
+    this.tools.now?.showUi(state);
     this.mark();
   }
 
-  painted({ legend }) {
-    showLegend(this.find("legend"), legend);
-    this.inspector.refresh();
-    this.overlay();
+  painted(frame) {
+    this.#frame = frame;
+    this.tools.now?.painted(frame);
     this.mark();
   }
 
-  // Where lights are, while one of these, the environment or the camera is selected and no material is looked at.
+  // Shows what lies over the picture where that belongs now.
   mark() {
-    const { scene, chosen } = this.acts.state;
-    const { camera, shapes, thing } = this.#outlined;
-    if (scene.camera !== camera || scene.shapes !== shapes || chosen.thing !== thing)
-      this.find("outline").classList.remove("shown");
-    const { tool, target } = this.ui.state;
-    const isLight = lampsOf(scene).some(({ thing }) => thing === chosen.thing);
-    const isOn = (isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect";
-    const tall = fitGuides(this.find("markers"), this.root, this.viewport.canvas);
-    this.markers.show(isOn, this.aspect, tall, target);
-    const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
-    this.axisViews.show();
-    this.handles.show(HANDLED.includes(tool), this.aspect, height);
+    this.tools.now?.mark(this.aspect);
   }
 
-  // Histogram and clipping follow the picture at their own pace.
-  overlay() {
-    const { histogram, clipping, guides } = this.ui.state;
-    if (guides) fitGuides(this.find("guides"), this.root, this.viewport.canvas);
-    if ((!histogram && !clipping) || this.#timer) return;
-    this.#timer = setTimeout(
-      () => {
-        this.#timer = null;
-        this.#overlaid = performance.now();
-        const image = this.viewport.pixels();
-        if (histogram) drawHistogram(this.find("histogram"), image);
-        if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
-      },
-      Math.max(0, this.#overlaid + OVERLAY_MS - performance.now()),
-    );
+  // The picture has another size.
+  resized() {
+    this.tools.now?.overlay();
+    this.mark();
+  }
+
+  // Another picture is on its way.
+  awaited() {
+    this.tools.now?.inspector.forget();
+  }
+
+  // The stream begins anew: what was asked of its pictures may not hold any more.
+  forget() {
+    this.tools.now?.picker.forget();
   }
 
   async tap(x, y, isAlt) {
@@ -157,63 +131,37 @@ export class ViewportController {
     const { tool } = this.ui.state;
     if (!place || tool === "inspect") return;
     try {
-      if (isAlt || tool === "highlight") await placeHighlight(this, place, this.aspect);
-      else if (tool === "focus") await this.focus(place);
-      else await this.select(place);
+      const tools = await this.tools.get();
+      if (isAlt || tool === "highlight") await tools.placeHighlight(place, this.aspect);
+      else if (tool === "focus") await tools.picks.focus(place, this.aspect);
+      else await tools.picks.select(place);
     } catch (error) {
       this.complain(error instanceof NotReady ? new Error(EARLY[isAlt ? "highlight" : tool] ?? EARLY.select) : error);
     }
   }
 
+  async #picks() {
+    return (await this.tools.get()).picks;
+  }
+
+  // The index of the shape at a point of the page, or null.
   async shapeAt(x, y) {
-    const place = this.viewport.place(x, y);
-    return place && this.picker.shape(this.acts.steady.scene, place);
+    return (await this.#picks()).shapeAt(x, y);
   }
 
-  async select(place) {
-    const { scene } = this.acts.state;
-    const shape = await this.picker.shape(scene, place);
-    if (shape === null || !scene.shapes[shape]) {
-      this.acts.select("/environment");
-      return this.say("Environment selected");
-    }
-    if (isOn(this.acts.state, "locked", [pointer("shapes", shape)])) return this.say("It is locked");
-    this.acts.select(pointer("shapes", shape));
-    this.say(`${inWords(scene.shapes[shape].material)} selected`);
-    drawOutline(
-      this.find("outline"),
-      await this.picker.layer("shape_id", scene),
-      shape,
-      getComputedStyle(this.root).getPropertyValue("--accent-bright"),
-    );
-    const { camera, shapes } = scene;
-    this.#outlined = { camera, shapes, thing: this.acts.state.chosen.thing };
-    this.find("outline").classList.add("shown");
-    this.mark();
+  // Has shapeAt() answer at once.
+  async prepare() {
+    await (await this.#picks()).prepare();
   }
 
-  async focus(place) {
-    const { camera } = this.acts;
-    const far = await this.picker.depth(this.acts.state.scene, place);
-    if (!(far > 0)) return this.say("Nothing there to focus on");
-    const along = far * dot(ray(camera, place.x, place.y, this.aspect), axes(camera).forward);
-    const lens = camera.aperture_radius > 0 ? {} : { aperture_radius: Number((along * LENS_SHARE).toPrecision(2)) };
-    this.acts.setCamera({ focus_distance: Number(along.toPrecision(4)), ...lens });
-    this.say(`Focus at ${along.toPrecision(3)} metres${lens.aperture_radius ? ", aperture opened" : ""}`);
-  }
-
-  // The box around each shape of the scene: what the document tells, else what is seen of it, else null.
+  // The box around each shape of the scene, or null where it is not known.
   async boxes() {
-    const { scene } = this.acts.state;
-    const known = scene.shapes.map(box);
-    if (known.every(Boolean)) return known;
-    const seen = await this.picker.boxes(scene, this.acts.camera, BRIEF_MS).catch(() => new Map());
-    return known.map((each, i) => each ?? seen.get(i) ?? null);
+    return (await this.#picks()).boxes();
   }
 
   // As in light-there.js.
-  irradianceFor(shapes, toLight, exposure) {
-    return irradianceFor(this.stream, shapes, toLight, exposure);
+  async irradianceFor(shapes, toLight, exposure) {
+    return (await this.tools.get()).irradianceFor(shapes, toLight, exposure);
   }
 
   // What of the camera has to change for a ball to fill the picture.
@@ -223,21 +171,6 @@ export class ViewportController {
 
   // Brings a thing into the middle; without one, everything that is not endless.
   async frame(thing = this.acts.state.chosen.thing) {
-    const { scene } = this.acts.state;
-    const shape = thing.startsWith("/shapes/") ? at(scene, thing) : null;
-    try {
-      const around = shape
-        ? (ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2]))))
-        : together(
-            scene.shapes
-              .filter((shape) => !isFlat(shape))
-              .map(ball)
-              .filter(Boolean),
-          );
-      if (around?.radius > 0) this.acts.setCamera(this.framed(around));
-      else this.say("It can't be seen from here");
-    } catch (error) {
-      this.complain(error);
-    }
+    await (await this.#picks()).frame(thing, (around) => this.framed(around));
   }
 }

@@ -1,7 +1,6 @@
 // Frames in: decoded off the main thread, painted with the display's beat, acknowledged after that.
 
 import { isPainted } from "../document/picture-view.js";
-import { LEGENDS, paintLayer } from "./aov.js";
 
 export class Viewport {
   #context;
@@ -32,6 +31,9 @@ export class Viewport {
   }
 
   async #decode(header, bytes, view) {
+    if (view.aov === "color" && view.format !== "rgba32f")
+      return { bitmap: await createImageBitmap(new Blob([bytes], { type: header.mime })) };
+    const { LEGENDS, paintLayer } = await import("./aov.js"); // for other layers than the first picture's
     if (view.format !== "rgba32f") {
       return { bitmap: await createImageBitmap(new Blob([bytes], { type: header.mime })), legend: LEGENDS[view.aov] };
     }

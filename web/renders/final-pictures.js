@@ -22,7 +22,6 @@ export class FinalPictures {
   constructor({ find, schema, page, editor, ui, messages, recipes, title, compareWith, complain, say }) {
     Object.assign(this, { page, editor, ui, messages, recipes, title, complain, say });
     const view = () => page.view;
-    this.stage = find("stage"); // which frames the picture in its shape
     this.renders = new Renders({
       changed: () => this.#show(),
       ended: (render) => this.#ended(render),
@@ -69,7 +68,6 @@ export class FinalPictures {
     const { settings } = this.editor.state;
     const { quality: presets, limits } = this.page.info;
     const screen = this.page.size;
-    this.stage.style.setProperty("--ratio", String(screen.width / screen.height));
     this.sheet.show(settings, { screen, presets, limits, live: this.page.header });
     this.#list();
   }

@@ -1,0 +1,144 @@
+// The parts of the page that can wait until the first picture is there, each on demand: final pictures, the comparison,
+// files that come in and things that are added, what the header's buttons open, small pictures of textures.
+
+import { materialModels, blackMaterial } from "./server/schema.js";
+import { namesOf } from "./document/page-state.js";
+import { OnDemand, useSheet } from "./lib/on-demand.js";
+
+// `titleOf(chosen)` is the scene's name in words; `push()` tells the streams what is wanted.
+export function laterParts({
+  find,
+  schema,
+  page,
+  editor,
+  ui,
+  stream,
+  viewport,
+  controller,
+  messages,
+  titleOf,
+  push,
+  complain,
+  say,
+}) {
+  const title = () => titleOf(editor.state.chosen) || "Your own scene";
+
+  const recipes = new OnDemand(
+    () => import("./picture/picture-recipe.js"),
+    ({ pictureRecipes }) =>
+      pictureRecipes({
+        schema,
+        acts: editor,
+        info: () => page.info,
+        size: () => page.size,
+        view: () => page.view,
+        viewDefaults: page.viewDefaults,
+      }),
+    { complain },
+  );
+
+  const comparison = new OnDemand(
+    () => import("./picture/compare.js"),
+    ({ Comparison }) =>
+      new Comparison(
+        {
+          root: find("comparison"),
+          stage: find("stage"),
+          divider: find("divider"),
+          canvas: find("picture-b"),
+          difference: find("difference"),
+        },
+        {
+          first: viewport,
+          acts: editor,
+          models: Object.keys(materialModels(schema.scene)),
+          names: namesOf,
+          lost: () => {},
+          beside: () => stream.session,
+          headerOfA: () => page.header,
+        },
+      ),
+    { complain, arrived: () => push() },
+  );
+
+  const textures = new OnDemand(
+    () => import("./forms/texture-thumbnails.js"),
+    ({ TextureThumbnails }) => new TextureThumbnails(blackMaterial(schema.scene)),
+    { complain },
+  );
+
+  const adder = new OnDemand(
+    () => import("./adding.js"),
+    ({ Adder }) => new Adder({ acts: editor, controller }),
+    { complain },
+  );
+
+  const importer = new OnDemand(
+    () => import("./importer.js"),
+    async ({ Importer }) => {
+      const [beside, thumbnails, { reopen }] = await Promise.all([adder.get(), textures.get(), recipes.get()]);
+      return new Importer({ schema, acts: editor, adder: beside, messages, controller, reopen, thumbnails });
+    },
+    { complain },
+  );
+
+  const menus = new OnDemand(
+    () => import("./header.js"),
+    async ({ makeHeader }) =>
+      makeHeader({
+        find,
+        page,
+        editor,
+        stream,
+        recipes: await recipes.get(),
+        messages,
+        titleOf,
+        openFiles: () => importer.calls("browse")("open"),
+        addFiles: () => importer.calls("browse")("add"),
+        complain,
+        say,
+      }),
+    { complain },
+  );
+  for (const id of ["page-save", "export-menu", "readings"]) menus.opens(find(id));
+  menus.answers(find("share"));
+
+  const finals = new OnDemand(
+    async () => {
+      const [module] = await Promise.all([import("./renders/final-pictures.js"), useSheet("renders.css")]);
+      return module;
+    },
+    async ({ FinalPictures }) => {
+      const [compared, made] = await Promise.all([comparison.get(), recipes.get()]);
+      return new FinalPictures({
+        find,
+        schema,
+        page,
+        editor,
+        ui,
+        messages,
+        recipes: made,
+        title,
+        compareWith: compared.compareWith ? (render) => compared.compareWith(render) : null,
+        complain,
+        say,
+      });
+    },
+    { complain, arrived: (made) => page.info && made.show() },
+  );
+
+  const all = [comparison, textures, adder, importer, menus, finals, controller.tools];
+  return {
+    comparison,
+    textures,
+    adder,
+    importer,
+    menus,
+    finals,
+    // Has them ready for a hand, now that nothing waits for the network.
+    prepare() {
+      for (const part of all) part.prepare();
+      for (const rest of [import("./lib/ask.js"), import("./lib/name-entry.js")]) rest.catch(() => {});
+    },
+  };
+}

@@ -1,0 +1,102 @@
+// What a click in the picture is about, and what the camera is brought to: selecting, focusing, framing.
+
+import { ball, box, isFlat, together } from "../document/bounds.js";
+import { axes, ray } from "../document/camera.js";
+import { isOn } from "../document/outline.js";
+import { Picker, drawOutline } from "../document/picking.js";
+import { inWords } from "../lib/format-text.js";
+import { at, pointer } from "../lib/patch.js";
+import { dot } from "../lib/vector.js";
+
+const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
+const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
+
+export class Picks {
+  #outlined = {}; // what the outline was drawn of: it stays while that is so
+
+  // `find(id)` elements, `acts` the editor, `stream`, `viewport`; `say(text)`, `complain(error)`.
+  constructor({ find, acts, stream, viewport, say, complain }) {
+    Object.assign(this, { find, acts, viewport, say, complain });
+    this.picker = new Picker(stream);
+  }
+
+  // The outline goes with what it was drawn of.
+  mark() {
+    const { scene, chosen } = this.acts.state;
+    const { camera, shapes, thing } = this.#outlined;
+    if (scene.camera !== camera || scene.shapes !== shapes || chosen.thing !== thing)
+      this.find("outline").classList.remove("shown");
+  }
+
+  // The index of the shape at a point of the page, or null.
+  async shapeAt(x, y) {
+    const place = this.viewport.place(x, y);
+    return place && this.picker.shape(this.acts.steady.scene, place);
+  }
+
+  // Has shapeAt() answer at once.
+  prepare() {
+    return this.picker.layer("shape_id", this.acts.steady.scene).catch(() => {});
+  }
+
+  async select(place) {
+    const { scene } = this.acts.state;
+    const shape = await this.picker.shape(scene, place);
+    if (shape === null || !scene.shapes[shape]) {
+      this.acts.select("/environment");
+      return this.say("Environment selected");
+    }
+    if (isOn(this.acts.state, "locked", [pointer("shapes", shape)])) return this.say("It is locked");
+    this.acts.select(pointer("shapes", shape));
+    this.say(`${inWords(scene.shapes[shape].material)} selected`);
+    drawOutline(
+      this.find("outline"),
+      await this.picker.layer("shape_id", scene),
+      shape,
+      getComputedStyle(this.find("stage")).getPropertyValue("--accent-bright"),
+    );
+    const { camera, shapes } = scene;
+    this.#outlined = { camera, shapes, thing: this.acts.state.chosen.thing };
+    this.find("outline").classList.add("shown");
+    this.mark();
+  }
+
+  async focus(place, aspect) {
+    const { camera } = this.acts;
+    const far = await this.picker.depth(this.acts.state.scene, place);
+    if (!(far > 0)) return this.say("Nothing there to focus on");
+    const along = far * dot(ray(camera, place.x, place.y, aspect), axes(camera).forward);
+    const lens = camera.aperture_radius > 0 ? {} : { aperture_radius: Number((along * LENS_SHARE).toPrecision(2)) };
+    this.acts.setCamera({ focus_distance: Number(along.toPrecision(4)), ...lens });
+    this.say(`Focus at ${along.toPrecision(3)} metres${lens.aperture_radius ? ", aperture opened" : ""}`);
+  }
+
+  // The box around each shape of the scene: what the document tells, else what is seen of it, else null.
+  async boxes() {
+    const { scene } = this.acts.state;
+    const known = scene.shapes.map(box);
+    if (known.every(Boolean)) return known;
+    const seen = await this.picker.boxes(scene, this.acts.camera, BRIEF_MS).catch(() => new Map());
+    return known.map((each, i) => each ?? seen.get(i) ?? null);
+  }
+
+  // Brings a thing into the middle; without one, everything that is not endless. `framed(around)` as the controller has.
+  async frame(thing, framed) {
+    const { scene } = this.acts.state;
+    const shape = thing.startsWith("/shapes/") ? at(scene, thing) : null;
+    try {
+      const around = shape
+        ? (ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2]))))
+        : together(
+            scene.shapes
+              .filter((each) => !isFlat(each))
+              .map(ball)
+              .filter(Boolean),
+          );
+      if (around?.radius > 0) this.acts.setCamera(framed(around));
+      else this.say("It can't be seen from here");
+    } catch (error) {
+      this.complain(error);
+    }
+  }
+}
