@@ -25,6 +25,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from service.renders.store.store import RenderStore
 from service.storage.database import FILE
 from tests.serving import SCENE, Server, kill
 
@@ -75,7 +76,8 @@ def main(name: str) -> None:
 
 def _fill(folder: Path) -> None:
     """Documents and an asset without an owner, and an owner's renders: one gone, which a key still names, one done,
-    one cancelled, one failed, one under way with a checkpoint, and one that waits."""
+    one cancelled, one failed, one under way with a checkpoint, and one that waits; and a batch whose first renders
+    wait."""
     first = Server(folder, warms=False)
     asset = first.http.post("/v1/assets", content=OBJ).raise_for_status().json()["id"]
     clay = {"type": "diffuse", "albedo": 0.6}
@@ -127,6 +129,11 @@ def _fill(folder: Path) -> None:
     running = sent(1 << 14, "running")
     sent(8, "queued")
     while not (folder / "data" / "renders" / f"{running}.checkpoint").exists():
+        time.sleep(0.01)
+    over = [{"path": "/materials/ball/roughness", "values": [0.1, 0.5, 0.9]}]
+    body = {"scene": SCENE, "settings": {**TINY, "max_samples": 8, "denoise": False}, "over": over, "label": "batch"}
+    second.http.post("/v1/batches", json=body).raise_for_status()
+    while len(RenderStore(folder / "data").members()) < 2:  # as many as are put in line at a time
         time.sleep(0.01)
     assert second.http.get(f"/v1/renders/{gone}").status_code == 410
     kill(second)

@@ -33,7 +33,10 @@ Values = dict[str, Any]
 
 
 def labelled(folder: Path) -> dict[str | None, Any]:
-    return {each.order.label: each for each in RenderStore(folder).load()}
+    """The renders but those of batches."""
+    store = RenderStore(folder)
+    members = store.members()
+    return {each.order.label: each for each in store.load() if each.order.id not in members}
 
 
 def change(folder: Path, label: str, column: str, to: str) -> None:
@@ -66,7 +69,7 @@ def test_renders_of_every_released_revision_are_read(name: str, tmp_path: Path) 
     for label, kind in (("done", "picture"), ("cancelled", "picture"), ("running", "checkpoint")):
         assert store.read_now(found[label].order.id, kind, 1).saved.samples > 0
     report = Report()
-    assert check_renders(folder, report) == 5 and not report.notes
+    assert check_renders(folder, report) == 5 + len(store.members()) and not report.notes
     assert [fault.split(": ")[1][:20] for fault in report.faults] == ["there is no asset sh"]  # it made that one fail
 
 
@@ -153,6 +156,8 @@ def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, 
     """Also where one row does not fit."""
     folder = frozen.opened(name, tmp_path / "data")
     ids = {label: each.order.id for label, each in labelled(folder).items()}
+    batches = [each.order.id for each in RenderStore(folder).batches.all()]
+    assert len(batches) == (int(name) >= 9)
     change(folder, "cancelled", "settings", "{")
     with closing(sqlite3.connect(folder / FILE)) as file, file:  # it was kept for as long as it lies here
         file.execute("UPDATE renders SET ended_at = unixepoch() WHERE ended_at IS NOT NULL")
@@ -166,5 +171,8 @@ def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, 
             ended = served.http.get(f"/v1/renders/{ids[label]}?wait=30").raise_for_status().json()
             assert (ended["state"], ended["label"]) == ("done", label)
             assert served.http.get(f"/v1/renders/{ids[label]}/image?format=npy").status_code == 200
+        for id in batches:
+            ended = served.http.get(f"/v1/batches/{id}?wait=30").raise_for_status().json()
+            assert (ended["state"], ended["counts"]["done"]) == ("done", 3)
     finally:
         assert served.stop() == 0
