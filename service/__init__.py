@@ -3,6 +3,7 @@
 app        what is served: the routes and the editor's files
 cli        the command line; `commands` has a module for each command
 config     every limit, and the SUNBOX_* variables that set it
+callback_hosts  where callbacks may be sent
 problems   the errors that callers see, with their HTTP statuses
 colorimetry  sRGB and linear Rec.709
 views      the names of AOVs and tone maps
@@ -16,6 +17,7 @@ presets    built-in scenes, materials and environments
 requests   from what a caller wrote to what the renderer takes
 renders    renders asked for over REST
 batches    renders of one scene that differ along axes
+callbacks  URLs that are told of the ends of renders and batches
 streams    scenes that are edited while they are watched
 renderers  the renderers' processes, kept alive, as one thing that work is sent to
 ipc        what the server and the renderer's process say to each other

@@ -58,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains and needs"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
+    commands.add_parser("callback-secret", help="print the secrets that sign callbacks, one a line")
     _bench(commands.add_parser("bench", help="measure"))
     return top
 
@@ -133,6 +134,8 @@ def _renders(command: argparse.ArgumentParser) -> None:
     submit.add_argument("--priority", type=int, metavar="N", help="-10 to 10, higher ones first (default: 0)")
     text = "a name of your own: the same render again instead of a second one, for 24 h"
     submit.add_argument("--idempotency-key", metavar="KEY", help=text)
+    text = "a URL that the server posts to at its end, on a host of its SUNBOX_CALLBACK_HOSTS"
+    submit.add_argument("--callback", metavar="URL", help=text)
     _asset_root(submit)
     listed = actions.add_parser("list", help="your renders, the newest first")
     listed.add_argument("--label", metavar="TEXT", help="only those with this label")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     ByteSize,
     Field,
@@ -19,6 +20,8 @@ from pydantic import (
     model_validator,
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from service.callback_hosts import checked_hosts, checked_secrets
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 2 GiB
 MIB, GIB = 2**20, 2**30
@@ -34,6 +37,10 @@ NUMBER = re.compile(r"[0-9]{1,6}")
 ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
 
 Words = Annotated[list[str], NoDecode]
+# Fields whose variables are lists, separated by commas.
+WORDS = (
+    "allowed_hosts", "allowed_origins", "api_key", "callback_hosts", "callback_secret", "devices", "trusted_proxies",
+)  # fmt: skip
 
 
 def _size(value: Any) -> Any:
@@ -87,6 +94,18 @@ class Config(BaseSettings):
         default_factory=list,
         description="Addresses and networks of proxies, separated by commas, whose `X-Forwarded-For` says who calls; "
         "without it that header changes nothing.",
+    )
+    callback_hosts: Annotated[list[str], NoDecode, AfterValidator(checked_hosts)] = Field(
+        default_factory=list,
+        description="Hosts to which [callbacks](#callbacks) may be sent, separated by commas (`hooks.example.org`, "
+        "`hooks.example.org:8443`, `http://10.0.0.5:8080`), and networks that are not public in which their "
+        "addresses may lie (`10.0.0.0/8`); without it callbacks are refused.",
+    )
+    callback_secret: Annotated[list[str], NoDecode, AfterValidator(checked_secrets)] = Field(
+        default_factory=list,
+        repr=False,
+        description="Secrets that sign callbacks, separated by commas: `whsec_` and 24 to 64 bytes in base64 "
+        "(default: one that is made and kept in the data folder; `sunbox callback-secret` prints it).",
     )
     data_dir: Path = Field(
         default_factory=_default_data_dir,
@@ -245,7 +264,7 @@ class Config(BaseSettings):
         """
         return {name: value for name, value in values.items() if value != "" or name == "api_key"}
 
-    @field_validator("allowed_hosts", "allowed_origins", "api_key", "devices", "trusted_proxies", mode="before")
+    @field_validator(*WORDS, mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         return [part.strip() for part in value.split(",")] if isinstance(value, str) else value

@@ -18,6 +18,7 @@ from service.assets.types import Kind
 from service.batches.batch import Batch
 from service.batches.members import Members
 from service.batches.queue import BatchQueue
+from service.callbacks.queue import Callbacks
 from service.config import Config
 from service.http.downloads import Downloads
 from service.images import animation
@@ -35,6 +36,7 @@ from service.requests.bodies import Bodies
 from service.requests.request_parser import unfolded
 from service.requests.request_reader import RequestReader
 from service.scene import Scene
+from service.storage.callback_rows import Kind as CallbackKind
 from service.storage.stores import Storage
 from service.streams.sessions import Sessions
 from service.system.executors import packing
@@ -76,6 +78,7 @@ class AppState:
     readiness: Readiness = field(init=False)
     bsdf: BsdfQuestions = field(init=False)
     batches: BatchQueue = field(init=False)
+    callbacks: Callbacks = field(init=False)
     waits: Shares = field(init=False)
 
     def __post_init__(self) -> None:
@@ -89,6 +92,7 @@ class AppState:
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
         self.batches = BatchQueue(self.render_queue, self._members, self.config.max_running + 1)
+        self.callbacks = Callbacks(self.config, self._told_of)
         self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
@@ -125,6 +129,7 @@ class AppState:
         await store.open()
         self.render_queue.resume(stored, self._resumed, self.batches.resume(batches), members)
         self.batches.go_on()
+        await self.callbacks.start()
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A new render. Raises TooLarge for one that never fits into the memory."""
@@ -140,6 +145,10 @@ class AppState:
         outcome = Outcome(warnings=list(packed.warnings) if packed is not None else [])
         waiting = self.render_queue.packed
         return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
+
+    def _told_of(self, kind: CallbackKind, id: str, owner: str) -> Job | Batch:
+        """Whose end a callback is about. Raises NotFound, Gone."""
+        return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
     def _resumed(self, stored: StoredRender) -> Job:
         return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
@@ -174,6 +183,7 @@ class AppState:
         until = time.monotonic() + FAREWELL_S
         await self.batches.close()
         await self.render_queue.close()
+        await self.callbacks.close()
         while self.sessions.attended and time.monotonic() < until:
             await asyncio.sleep(0.01)
 

@@ -34,7 +34,7 @@ LARGE_CLASSES = {
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems"},
+    {"service.problems", "service.callback_hosts"},
     {"service.config"},
     {"service.views", "service.colorimetry"},
     {"service.system"},
@@ -49,6 +49,7 @@ LAYERS = [
     {"service.renderers"},
     {"service.renders"},
     {"service.batches"},
+    {"service.callbacks"},
     {"service.streams"},
     {"service.worker"},
     {"service.http"},

@@ -12,6 +12,7 @@ bsdf_curves    the curves of each kind
 bsdf_figure    the figures, drawn by matplotlib
 import         a model as a document with files beside it
 info           what a scene contains, and what would render it here
+callback_secret  the secrets that sign callbacks
 check_data     whether the data folder is sound
 bench          the benchmarks
 health         the container's health check

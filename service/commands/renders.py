@@ -48,7 +48,8 @@ def _submit(client: Client, arguments: argparse.Namespace) -> int:
     chosen = read_settings(arguments.set or [], config, source.settings)
     settings = chosen.model_dump(mode="json", exclude_unset=True)
     scene = with_uploads(client, source, arguments.asset_root)
-    job = client.submit(scene, arguments.label, arguments.priority or 0, arguments.idempotency_key, **settings)
+    key, callback = arguments.idempotency_key, arguments.callback
+    job = client.submit(scene, arguments.label, arguments.priority or 0, key, callback, **settings)
     print(job.id)
     return 0
 

@@ -22,7 +22,8 @@ def run(arguments: argparse.Namespace) -> int:
     from service import app
     from service.logs import setup
 
-    setup.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
+    secrets = [*config.api_key, *config.callback_secret]
+    setup.configure(config.log_format, config.log_level, queued=True, secrets=secrets)
     if (closed := _closed(config.data_dir)) is not None:
         log.warning(CLOSED.format(user=os.geteuid(), owner=closed.stat().st_uid, folder=closed))
 

@@ -40,6 +40,7 @@ class ParsedBatch:
     label: str | None
     priority: int
     digest: str  # of the body as parsed JSON
+    callback: str | None = None  # URL
 
 
 def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
@@ -54,8 +55,9 @@ def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
         raise InvalidDocument([FieldError("/over", detail)])
     assets = dict.fromkeys(_checked(RequestParser(config), variations))
     axes = _AXES.dump_json(request.over, exclude_unset=True).decode()
+    digest = digest_of(document)
     return ParsedBatch(
-        folded(base), axes, len(variations), list(assets), request.label, request.priority, digest_of(document)
+        folded(base), axes, len(variations), list(assets), request.label, request.priority, digest, request.callback
     )
 
 

@@ -50,7 +50,7 @@ class ParserPool:
     """Processes that parse, started on demand: one for each thread that calls `parse` at the same time."""
 
     def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
-        self._config = config.model_copy(update={"api_key": []})  # a process that reads strangers' texts needs no key
+        self._config = config.model_copy(update={"api_key": [], "callback_secret": []})  # not for strangers' texts
         self._children = Children("service.requests.parser_child", BODIES)
         self._memory = memory or MemoryBudget(config.memory)
         self._room = _Room(config.max_json_memory)

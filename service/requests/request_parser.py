@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
+from service.callback_hosts import LONGEST_URL
 from service.config import Config
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings, resolve
@@ -31,6 +32,7 @@ class _Request(Model):
 class RenderRequest(_Request):
     label: Annotated[str, Field(max_length=LONGEST_LABEL)] | None = None
     priority: Annotated[int, Field(ge=-HIGHEST_PRIORITY, le=HIGHEST_PRIORITY)] = 0
+    callback: Annotated[str, Field(max_length=LONGEST_URL)] | None = None
 
 
 _REQUEST = TypeAdapter(_Request)
@@ -48,6 +50,7 @@ class ParsedRequest:
     label: str | None = None
     priority: int = 0
     digest: str = ""  # of the body as parsed JSON, where that was asked for
+    callback: str | None = None  # URL
 
 
 class RequestParser:
@@ -69,7 +72,9 @@ class RequestParser:
         scene, settings = self.both(request.scene, request.settings)
         assets, digest = references.references(request.scene), digest_of(document) if keyed else ""
         folded_scene = folded(request.scene)
-        return ParsedRequest(settings, scene, folded_scene, assets, request.label, request.priority, digest)
+        return ParsedRequest(
+            settings, scene, folded_scene, assets, request.label, request.priority, digest, request.callback
+        )
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
         """The scene and the settings. Raises InvalidDocument with the mistakes of both."""

@@ -4,6 +4,7 @@ renders          renders over REST
 submission       how a request for a render becomes one that waits
 batches          renders that differ along axes
 batch_files      the pictures of a batch in one file
+callbacks        which ends of renders and batches were told to whom
 events           the progress of renders as server-sent events
 waiting          waits that end when the client goes away
 stream           the stream's WebSocket
@@ -15,6 +16,7 @@ presets          built-in documents
 metrics          /metrics, in Prometheus' format
 info             what the service is, whether it lives, what its documents look like
 answers          what answers look like, for the API's description
+request_fields   what requests for renders and batches share, for the description
 errors           errors as problem+json
 description      openapi.json
 examples         documents that the description shows

@@ -16,7 +16,6 @@ from service.problems import ANSWERS
 from service.renders.store.record import State
 from service.requests.batch_request import MOST_AXES
 from service.requests.bsdf_request import MOST_SAMPLES
-from service.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
 from service.routes.examples import (
     ALBEDO,
     ANY_DOCUMENT,
@@ -31,6 +30,7 @@ from service.routes.examples import (
     SCENE,
     TERMS,
 )
+from service.routes.request_fields import NAMED
 from service.scene.material import MODELS
 from service.storage import documents
 
@@ -277,24 +277,9 @@ _RENDER: dict[str, Any] = {
     "additionalProperties": False,
     "properties": {"scene": reference("Scene"), "settings": reference("Settings")},
 }
-_NAMED = {
-    "label": {
-        "type": ["string", "null"],
-        "maxLength": LONGEST_LABEL,
-        "default": None,
-        "description": "A name to find renders by; several may have the same.",
-    },
-    "priority": {
-        "type": "integer",
-        "minimum": -HIGHEST_PRIORITY,
-        "maximum": HIGHEST_PRIORITY,
-        "default": 0,
-        "description": "Of one's own renders that wait the highest starts first; nothing is interrupted.",
-    },
-}
 RENDER_BODY = body(_RENDER, sphere=RENDER)
 RENDER_AGAIN: Responses = {200: {"description": "The body.", "content": {"application/json": {"schema": _RENDER}}}}
-LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAMED}, sphere=RENDER)
+LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | NAMED}, sphere=RENDER)
 _AXIS = {
     "anyOf": [reference("ValuesAxis"), reference("PatchesAxis"), reference("TurntableAxis")],
     "description": "What varies along it.",
@@ -304,7 +289,7 @@ BATCH_BODY = body(
     {
         **_RENDER,
         "required": ["scene", "over"],
-        "properties": _RENDER["properties"] | _NAMED | {"over": _OVER},
+        "properties": _RENDER["properties"] | NAMED | {"over": _OVER},
     },
     roughness=BATCH,
 )

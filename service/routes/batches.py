@@ -65,7 +65,7 @@ class AnimationQuery(Shown):
     summary="Start renders that differ along axes",
     description="Axes multiply, and the last runs fastest. Each step of each axis is validated before this answers, "
     "the other axes being at their first; no scene is packed before its turn. Render k is, to the bit, the render of "
-    "its document alone. `Idempotency-Key` as for renders.",
+    "its document alone. `Idempotency-Key` as for renders. A `callback` is sent once, at the batch's end.",
     openapi_extra=answers.BATCH_BODY,
     response_class=Response,
     responses=answers.shaped(answers.StartedBatch, "Its renders wait for their turns; `Location` leads to it.", 202)
@@ -110,10 +110,14 @@ async def _known(state: AppState, owner: str, key: str | None, parsed: ParsedBat
 async def _started(state: AppState, owner: str, parsed: ParsedBatch, key: IdempotencyKey | None) -> Batch:
     order = BatchOrder(
         secrets.token_hex(ID_BYTES), owner, parsed.renders, parsed.axes, parsed.label, parsed.priority, time.time(),
-        len(parsed.body) + len(parsed.axes),
+        len(parsed.body) + len(parsed.axes), parsed.callback,
     )  # fmt: skip
+    state.callbacks.check(parsed.callback, owner, state.render_queue.store is not None)
     async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
-        return await state.batches.submit(order, parsed.body, parsed.assets, key)
+        batch = await state.batches.submit(order, parsed.body, parsed.assets, key)
+    if parsed.callback is not None:
+        state.callbacks.follow(batch)
+    return batch
 
 
 @router.get(

@@ -89,6 +89,19 @@ BATCH_STATUS = {
     ],
     "eta_s": 4.2,
 }
+CALLBACK = {
+    "id": "msg_7c1f0d6a3b1e4c52a9d81f60",
+    "kind": "render",
+    "of": RENDER_ID,
+    "url": "https://hooks.example.org/sunbox",
+    "state": "due",
+    "attempts": 1,
+    "created": "2026-11-25T13:27:53.152Z",
+    "next": "2026-11-25T13:28:03.311Z",
+    "ended": None,
+    "status": 503,
+    "error": "it answered 503",
+}
 F = [[[0.0699, 0.0545, 0.0238], [15.3, 11.9, 5.21]]]
 METRICS = "# TYPE sunbox_frames_total counter\nsunbox_frames_total 0.0\n"
 
@@ -119,6 +132,7 @@ ANSWERS: dict[str, Any] = {
     "getRenderScene": RENDER,
     "startBatch": {"id": BATCH_ID, "renders": 3},
     "getBatch": BATCH_STATUS,
+    "listCallbacks": [CALLBACK],
     "convertMaterial": {"material": CONVERTED, "lost": []},
     "evaluateBsdf": {"f": F, "pdf": [[0.0699, 12.3]], "delta": [[]]},
     "getBsdfAlbedo": {

@@ -123,7 +123,7 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
     leases = _each_of(members, lambda seen: seen.leases)
     help = "Parts of divided pictures that a renderer was given by others, traced, failed to trace, or traced wrong."
     yield _counters("leases", help, ("renderer", "outcome"), leases)
-    errors = {(kind,): float(count) for kind, count in clients.errors.items()}
+    errors = _by_one(clients.errors)
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)
 
 
@@ -135,6 +135,10 @@ def _clients(state: AppState) -> Iterator[Metric]:
         pictures, failures = renders.store.pictures.bytes, renders.store.failures
         yield _gauge("render_picture_bytes", "Checkpoints and pictures of renders on the disk.", pictures)
         yield _counter("render_write_failures", "Writes of renders to the disk that failed.", failures)
+    yield _counters(
+        "callback_attempts", "Callbacks, by what became of them.", ("outcome",), _by_one(state.callbacks.outcomes)
+    )
+    yield _gauge("callbacks_pending", "Callbacks that wait for an end or an attempt.", state.callbacks.pending)
     sessions = {"connected": state.sessions.attended, "waiting": state.sessions.waiting}
     yield _gauges("streams", "Streams with a client, and those whose client may come back.", "state", sessions)
 
@@ -210,6 +214,11 @@ def _histograms(name: str, help: str, label: str, values: Mapping[str, Distribut
 def _buckets(values: Distribution) -> list[tuple[str, float]]:
     buckets = [(f"{bound:g}", float(count)) for bound, count in values.cumulative()]
     return [*buckets, ("+Inf", values.count)]
+
+
+def _by_one(counts: Mapping[str, int]) -> dict[tuple[str], float]:
+    """By the values of one label."""
+    return {(label,): float(count) for label, count in counts.items()}
 
 
 def _each(members: Sequence[Member], value: Callable[[Statistics], float]) -> dict[tuple[str], float]:

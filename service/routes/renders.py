@@ -113,7 +113,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
     summary="Start a render",
     description="It is stored before this answers, and outlives the server. `Idempotency-Key`: for 24 h the same key "
     "with the same body gives the same render, with another body 409. With `wait`, 200 where the render ends within "
-    "that many seconds; closing the connection does not cancel it.",
+    "that many seconds; closing the connection does not cancel it. `callback`: a URL that is sent its end.",
     openapi_extra=answers.LASTING_RENDER_BODY,
     response_class=Response,
     responses=answers.shaped(answers.Render, "It waits for its turn, or goes on; `Location` leads to it.", 202)

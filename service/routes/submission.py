@@ -74,9 +74,12 @@ async def _submitted(
     state: AppState, parsed: ParsedRequest, owner: str, began: float, key: IdempotencyKey | None = None
 ) -> Job:
     state.render_queue.admit(owner)
+    state.callbacks.check(parsed.callback, owner, state.render_queue.store is not None)
     async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
         job = await _packed(state, parsed, owner, began)
         await state.render_queue.submit(job, parsed.assets, key)
+    if parsed.callback is not None:
+        state.callbacks.follow(job)
     return job
 
 
@@ -85,7 +88,8 @@ async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: flo
     that is too much, it is packed again at its turn."""
     packed = await packing(partial(state.reader.pack, parsed.scene, owner=owner))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
-    order = Order(id, owner, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
+    now, size, callback = time.time(), len(document), parsed.callback
+    order = Order(id, owner, parsed.settings, parsed.label, parsed.priority, now, size, callback)
     return state.job(order, document, packed, time.monotonic() - began)
 
 

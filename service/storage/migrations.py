@@ -145,5 +145,20 @@ MIGRATIONS = (
             "CREATE INDEX renders_by_batch ON renders (batch) WHERE batch IS NOT NULL",
         ),
     ),
+    Migration(
+        "callbacks",
+        (
+            # `subject` is the id of a render or a batch. The body stands last, as it is read seldom.
+            """CREATE TABLE callbacks (
+                number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL,
+                kind TEXT NOT NULL, subject TEXT NOT NULL, host TEXT NOT NULL, url TEXT NOT NULL, state TEXT NOT NULL,
+                attempts INTEGER NOT NULL DEFAULT 0, created_at REAL NOT NULL, next_at REAL, ended_at REAL,
+                answer INTEGER, error TEXT, body TEXT
+            )""",
+            "CREATE INDEX callbacks_by_turn ON callbacks (state, next_at)",
+            "CREATE INDEX callbacks_by_owner ON callbacks (owner, state, number)",
+            "CREATE INDEX callbacks_by_subject ON callbacks (subject)",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -101,6 +101,7 @@ recording = Pool("recording", 1)  # the rows of renders, in order: the disk's ti
 saving_pictures = Pool("pictures", 1)  # small ones of renders to the disk and back: milliseconds
 saving_large_pictures = Pool("large", 1, NICENESS)  # seconds for the largest, while others' renders end
 reading_large_pictures = Pool("reading", 1)  # for which somebody waits
+resolving = Pool("resolving", 4)  # names of hosts that are told of ends: seconds where a name server is silent
 sending = Pool("sending", 2)  # scenes to the renderer: copied to shared memory
 tending = Pool("tending", 2)  # ends and replaces renderers, and restores what they had rendered
 measuring = Pool("measuring", 1)  # /metrics

@@ -82,7 +82,7 @@ def test_assets_of_documents_stay(tmp_path: Path) -> None:
 
 
 def test_deleted_documents_do_not_count(tmp_path: Path) -> None:
-    kept = storage(Config(data_dir=tmp_path, data_quota=1_000_000))
+    kept = storage(Config(data_dir=tmp_path, data_quota=1_100_000))
     ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"}
     for name in "ab":
         kept.documents.put("scenes", name, checked("scenes", {**SCENE, "shapes": [ball] * 6000}))

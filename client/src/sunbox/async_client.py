@@ -69,14 +69,14 @@ class AsyncClient:
         label: str | None = None,
         priority: int = 0,
         idempotency_key: str | None = None,
+        callback: str | None = None,
         **settings: Any,
     ) -> AsyncJob:
         """A render that goes on by itself. `label`: up to 200 characters to find it by; `priority`: -10 to 10 among
-        one's own; `idempotency_key`: the same key with the same request gives the same render within a day."""
+        one's own; `idempotency_key`: the same key with the same request gives the same render within a day;
+        `callback`: a URL that the server posts to at its end, where its operator allows the host."""
         document = await self._transport.uploaded(scene)
-        body = {"scene": document, "settings": settings, "priority": priority}
-        if label is not None:
-            body["label"] = label
+        body = {"scene": document, "settings": settings, "priority": priority} | _given(label, callback)
         key = {"idempotency-key": idempotency_key or uuid.uuid4().hex}  # so that it may be sent twice
         return AsyncJob(self._transport, (await self._transport.json("POST", "/v1/renders", body, key))["id"])
 
@@ -87,6 +87,7 @@ class AsyncClient:
         label: str | None = None,
         priority: int = 0,
         idempotency_key: str | None = None,
+        callback: str | None = None,
         **settings: Any,
     ) -> AsyncBatch:
         """Renders of a scene that varies along axes. `over`: a list of axes, `{"path": "/materials/a/roughness",
@@ -94,7 +95,7 @@ class AsyncClient:
         and the last runs fastest. Or a dict of paths and values, an axis for each. The others as of `submit`."""
         axes = [{"path": path, "values": values} for path, values in over.items()] if isinstance(over, dict) else over
         body = {"scene": await self._transport.uploaded(scene), "settings": settings, "over": axes}
-        body |= {"priority": priority} | ({} if label is None else {"label": label})
+        body |= {"priority": priority} | _given(label, callback)
         key = {"idempotency-key": idempotency_key or uuid.uuid4().hex}
         return AsyncBatch(self._transport, (await self._transport.json("POST", "/v1/batches", body, key))["id"])
 
@@ -210,3 +211,8 @@ class AsyncClient:
 
 def _saved(*steps: str) -> str:
     return "/v1/documents/" + "/".join(quote(step, safe="") for step in steps)
+
+
+def _given(label: str | None, callback: str | None) -> dict[str, str]:
+    """The members of a request that are not null."""
+    return {name: value for name, value in (("label", label), ("callback", callback)) if value is not None}

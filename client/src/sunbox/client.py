@@ -57,10 +57,11 @@ class Client:
         label: str | None = None,
         priority: int = 0,
         idempotency_key: str | None = None,
+        callback: str | None = None,
         **settings: Any,
     ) -> Job:
         """A render that goes on by itself, also when this program has ended."""
-        return Job(run(self._client.submit(scene, label, priority, idempotency_key, **settings)))
+        return Job(run(self._client.submit(scene, label, priority, idempotency_key, callback, **settings)))
 
     def batch(
         self,
@@ -69,10 +70,11 @@ class Client:
         label: str | None = None,
         priority: int = 0,
         idempotency_key: str | None = None,
+        callback: str | None = None,
         **settings: Any,
     ) -> Batch:
         """Renders of a scene that varies along axes, which go on when this program has ended."""
-        return Batch(run(self._client.batch(scene, over, label, priority, idempotency_key, **settings)))
+        return Batch(run(self._client.batch(scene, over, label, priority, idempotency_key, callback, **settings)))
 
     def batch_of(self, id: str) -> Batch:
         """A batch by its id; asks nothing."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from service.renders.store.record import IdempotencyKey
 from service.renders.store.rows import KEY_S
+from service.storage import callback_rows
 from service.storage.database import Database
 
 
@@ -23,6 +24,7 @@ class BatchOrder:
     priority: int = 0
     created_at: float = 0.0  # s since 1970
     bytes: int = 0
+    callback: str | None = None  # URL that is told of its end; not there where the order comes from the store
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class BatchRows:
             ).lastrowid  # fmt: skip
             assert number is not None
             database.executemany("INSERT INTO batch_uses VALUES (?, ?)", [(asset, number) for asset in set(uses)])
+            callback_rows.insert(database, "batch", order.id, order.owner, order.callback, order.created_at)
         return number
 
     def all(self) -> list[StoredBatch]:

@@ -29,6 +29,7 @@ class Order:
     priority: int = 0  # among the owner's renders, higher ones start first
     created_at: float = 0.0  # s since 1970
     bytes: int = 0  # that it adds to the store: its document, or its patch where another render brings the document
+    callback: str | None = None  # URL that is told of its end; not there where the order comes from the store
 
 
 @dataclass(frozen=True)

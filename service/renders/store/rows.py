@@ -16,6 +16,7 @@ from service.renders.store.record import (
     settings_json,
     stored_render,
 )
+from service.storage import callback_rows
 from service.storage.database import Database
 
 KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
@@ -81,6 +82,7 @@ class RenderRows:
             database.executemany(
                 "INSERT OR IGNORE INTO render_uses VALUES (?, ?)", [(asset, number) for asset in uses]
             )
+            callback_rows.insert(database, "render", order.id, order.owner, order.callback, order.created_at)
             if key is not None:
                 taken = (order.owner, key.key, key.digest, number, time.time())
                 database.execute("INSERT OR REPLACE INTO render_keys VALUES (?, ?, ?, ?, ?)", taken)

@@ -1,0 +1,27 @@
+"""What is told of an end: some hundred bytes, with ids by which the rest can be asked for."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+from service.batches.batch import Batch
+from service.renders.job import Job
+from service.renders.status import iso
+
+OF_RENDERS = (
+    "id", "state", "label", "created", "started", "ended", "reason", "samples", "noise", "elapsed_s", "problem",
+)  # fmt: skip
+OF_BATCHES = ("id", "state", "label", "created", "counts")
+
+
+def event(ended: Job | Batch) -> str:
+    """The body of a callback, as JSON: `type` and `timestamp` are those of Standard Webhooks."""
+    names = OF_RENDERS if isinstance(ended, Job) else OF_BATCHES
+    status = ended.status()
+    data: dict[str, Any] = {name: status[name] for name in names if name in status}
+    if (problem := data.get("problem")) is not None:
+        data["problem"] = {name: problem[name] for name in ("type", "title", "detail") if name in problem}
+    kind = "render.ended" if isinstance(ended, Job) else "batch.ended"
+    return json.dumps({"type": kind, "timestamp": iso(time.time()), "data": data}, separators=(",", ":"))

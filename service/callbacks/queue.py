@@ -1,0 +1,204 @@
+"""All callbacks: each is sent when its render or batch has ended, and again where that fails, if need be by later
+servers."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import time
+from collections import Counter
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from service.batches.batch import Batch
+from service.callback_hosts import CallbackHosts
+from service.callbacks import signing
+from service.callbacks.events import event
+from service.config import Config
+from service.problems import FieldError, InvalidDocument, ServiceError, TooManyRequests
+from service.renders.job import Job
+from service.storage.callback_rows import Callback, CallbackRows, Kind
+from service.storage.database import Database
+from service.system.executors import recording, resolving
+
+if TYPE_CHECKING:
+    import ssl
+
+AT_ONCE, OF_ONE_HOST = 8, 2  # attempts: a host that does not answer leaves room for the others
+EACH = 10_000  # callbacks of one owner that have not ended
+RETRY_S = 60  # when to ask again where an owner has as many
+# Seconds between the eight attempts, half a day in all: a render is kept for a day, so that who is told can still
+# fetch its picture. Each is longer or shorter by up to a tenth, so that what failed together is not sent together.
+PAUSES = (5.0, 60.0, 300.0, 1_800.0, 3_600.0, 3 * 3_600.0, 8 * 3_600.0)
+SCATTER = 0.1
+LONGEST_S = 60.0  # between two looks for what is due: clocks jump
+AGAIN_S = 5.0  # after the disk failed
+GONE = 410  # by Standard Webhooks: the receiver wants no more
+
+log = logging.getLogger(__name__)
+
+
+class Callbacks:
+    """For the event loop, but for `listed`."""
+
+    def __init__(self, config: Config, find: Callable[[Kind, str, str], Job | Batch]) -> None:
+        """`find` gives the render or batch of an id and owner, and raises NotFound, Gone."""
+        self._config = config
+        self._hosts = CallbackHosts.parse(config.callback_hosts)
+        self._find = find
+        self._rows = CallbackRows(Database(config.data_dir))
+        self.listed = self._rows.listed
+        self.outcomes: Counter[str] = Counter()  # of attempts: delivered, retried, failed
+        self._pending: Counter[str] = Counter()  # that have not ended, by owner
+        self._sending = dict[str, Callback]()  # by id
+        self._tasks = set[asyncio.Task[None]]()
+        self._woken = asyncio.Event()
+        self._secrets: list[str] = []
+        self._tls: ssl.SSLContext | None = None
+
+    @property
+    def pending(self) -> int:
+        return self._pending.total()
+
+    def check(self, url: str | None, owner: str, stored: bool) -> None:
+        """Raise InvalidDocument for a URL that no callback may go to, TooManyRequests where its owner has too many.
+        `stored`: whether renders outlive the server."""
+        if url is None:
+            return
+        try:
+            self._hosts.origin(url)
+            if not stored:
+                raise ValueError("needs the data folder, which cannot be written to")
+        except ValueError as error:
+            raise InvalidDocument([FieldError("/callback", str(error))]) from None
+        if self._pending[owner] >= EACH:
+            raise TooManyRequests(f"{EACH} callbacks of yours wait: no more may", RETRY_S)
+
+    async def start(self) -> None:
+        """Go on with what an earlier server left."""
+        pending, waiting = await recording(self._rows.pending), await recording(self._rows.waiting)
+        self._pending = pending
+        if not self._hosts.origins and not pending:
+            return
+        for each in waiting:
+            try:
+                self._do(self._follow(self._find(each.kind, each.subject, each.owner)))
+            except ServiceError as error:  # it ended, and made room for others before anybody was told
+                self._do(self._end(each, error))
+        self._do(self._run())
+
+    def follow(self, subject: Job | Batch) -> None:
+        """Send a callback when it has ended; it is stored already."""
+        self._pending[subject.owner] += 1
+        self._do(self._follow(subject))
+
+    async def close(self) -> None:
+        """The server ends: what is not delivered is left for the next one."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _follow(self, subject: Job | Batch) -> None:
+        await subject.finished.wait()
+        if isinstance(subject, Job):
+            await subject.recorded()
+        kind: Kind = "render" if isinstance(subject, Job) else "batch"
+        await self._stored(partial(self._rows.make_due, kind, subject.id, event(subject), time.time()))
+        self._woken.set()
+
+    async def _stored(self, write: Callable[[], None]) -> None:
+        """Write, again and again where the disk fails."""
+        while True:
+            try:
+                return await recording(write)
+            except ServiceError as error:
+                log.warning("could not store the state of a callback", {"error": error})
+                await asyncio.sleep(AGAIN_S)
+
+    async def _run(self) -> None:
+        """Send what is due, a few at a time."""
+        from service.callbacks import posting
+
+        while True:
+            self._woken.clear()
+            try:
+                if self._tls is None:
+                    self._secrets = await recording(partial(signing.secrets_of, self._config))
+                    self._tls = await resolving(posting.tls)
+                pause = await self._begin()
+            except ServiceError as error:
+                log.error("could not send callbacks", {"error": error})
+                pause = AGAIN_S
+            except Exception:
+                log.exception("could not send callbacks")
+                pause = AGAIN_S
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._woken.wait(), pause)
+
+    async def _begin(self) -> float:
+        """Begin all attempts that are due and have room; the seconds until the next one."""
+        while len(self._sending) < AT_ONCE:
+            busy = Counter(each.host for each in self._sending.values())
+            full = [host for host, attempts in busy.items() if attempts >= OF_ONE_HOST]
+            found = await recording(partial(self._rows.next, full, list(self._sending)))
+            left = LONGEST_S if found is None else (found.next_at or 0.0) - time.time()
+            if found is None or left > 0:
+                return min(left, LONGEST_S)
+            self._sending[found.id] = found
+            self._do(self._attempt(found))
+        return LONGEST_S
+
+    async def _attempt(self, callback: Callback) -> None:
+        from service.callbacks import posting
+
+        answer, error = None, None
+        try:
+            body, now = (callback.body or "").encode(), time.time()
+            headers = signing.headers(callback.id, int(now), body, self._secrets)
+            assert self._tls is not None
+            answer = await posting.post(callback.url, body, headers, self._hosts, self._tls)
+            if not 200 <= answer < 300:
+                error = f"it answered {answer}" + (", and redirects are not followed" if answer // 100 == 3 else "")
+        except posting.NotSent as reason:
+            error = str(reason)
+        except Exception:
+            log.exception("a callback could not be sent")
+            error = "the server could not send it"
+        await self._stored(partial(self._rows.attempted, self._after(callback, answer, error)))
+        del self._sending[callback.id]
+        self._woken.set()
+
+    def _after(self, callback: Callback, answer: int | None, error: str | None) -> Callback:
+        """What becomes of a callback by an attempt."""
+        now, attempts = time.time(), callback.attempts + 1
+        more = attempts <= len(PAUSES) and answer != GONE
+        known = replace(callback, attempts=attempts, answer=answer, error=error, next_at=None)
+        fields = {"host": callback.host, "id": callback.id, "attempts": attempts}
+        if error is not None and more:
+            self.outcomes["retried"] += 1
+            pause = PAUSES[attempts - 1] * random.uniform(1 - SCATTER, 1 + SCATTER)
+            return replace(known, next_at=now + pause)
+        self._pending[callback.owner] -= 1
+        if error is None:
+            self.outcomes["delivered"] += 1
+            log.debug("delivered a callback", fields)
+            return replace(known, state="delivered", ended_at=now)
+        self.outcomes["failed"] += 1
+        log.warning("gave up a callback", fields | {"error": error})
+        return replace(known, state="failed", ended_at=now)
+
+    async def _end(self, callback: Callback, error: ServiceError) -> None:
+        """Nobody is told of it: its render is gone."""
+        self._pending[callback.owner] -= 1
+        self.outcomes["failed"] += 1
+        gone = replace(callback, state="failed", ended_at=time.time(), error=error.detail)
+        await self._stored(partial(self._rows.attempted, gone))
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
