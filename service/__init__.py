@@ -18,6 +18,7 @@ requests   from what a caller wrote to what the renderer takes
 renders    renders asked for over REST
 batches    renders of one scene that differ along axes
 callbacks  URLs that are told of the ends of renders and batches
+verdict    whether two pictures differ beyond noise
 streams    scenes that are edited while they are watched
 renderers  the renderers' processes, kept alive, as one thing that work is sent to
 ipc        what the server and the renderer's process say to each other

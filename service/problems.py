@@ -80,7 +80,11 @@ class Forbidden(ServiceError):
 
 
 class NotFound(ServiceError):
-    pass
+    """`pointer` says which part of a document names what is not there, where one does."""
+
+    def __init__(self, detail: str = "", pointer: str = "") -> None:
+        super().__init__(detail)
+        self.pointer = pointer
 
 
 class Conflict(ServiceError):
@@ -188,7 +192,7 @@ def problem(error: Exception) -> dict[str, Any]:
     }
     if isinstance(error, InvalidDocument):
         body["errors"] = [{"pointer": e.pointer, "detail": e.detail} for e in error.errors]
-    elif isinstance(error, TooLarge) and error.pointer:
+    elif isinstance(error, TooLarge | NotFound) and error.pointer:
         body["errors"] = [{"pointer": error.pointer, "detail": error.detail}]
     elif isinstance(error, AssetError) and error.place:
         body["errors"] = [{"pointer": error.place, "detail": error.detail}]

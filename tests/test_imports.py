@@ -50,6 +50,7 @@ LAYERS = [
     {"service.renders"},
     {"service.batches"},
     {"service.callbacks"},
+    {"service.verdict"},
     {"service.streams"},
     {"service.worker"},
     {"service.http"},

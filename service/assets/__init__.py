@@ -5,6 +5,7 @@ errors        ParseError, which readers raise
 formats       the formats, and how a file's format is recognised
 source        the bytes of an upload, in memory or in a file
 store         uploaded assets
+rendered      uploaded pictures that Sunbox rendered, with what their noise is
 describe      the description of an asset: size, bounds, warnings
 folder        the files of the store, each written whole or not at all
 folder_totals  the disk space of all assets, updated with each change

@@ -68,6 +68,16 @@ class ImageData:
 
 
 @dataclass(frozen=True)
+class RenderedPicture:
+    """What an EXR with the layer `variance` knows of the render that it was written from. The array is read-only."""
+
+    layers: Floats  # (height, width, 6), finite: colour and the variance of each channel's mean
+    samples: int  # of each pixel
+    seed: int
+    denoised: bool
+
+
+@dataclass(frozen=True)
 class ScenePart:
     """A separate file for a part of a scene: a mesh as PLY, or an image as it was (then without counts)."""
 

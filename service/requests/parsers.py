@@ -8,6 +8,7 @@ from typing import Any, Literal
 from service.config import Config
 from service.requests.batch_request import parse_batch
 from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
+from service.requests.compare_request import parse_compare
 from service.requests.conversion_request import parse_conversion
 from service.requests.request_parser import RequestParser
 from service.scene import load_json
@@ -15,7 +16,7 @@ from service.storage.documents import checked
 
 Kind = Literal[
     "render", "keyed_render", "batch", "request", "scene", "scenes", "materials", "bsdf", "albedo", "terms",
-    "conversion",
+    "conversion", "comparison",
 ]  # fmt: skip
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
@@ -30,4 +31,5 @@ PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "albedo": lambda config, body: parse_albedo(body),
     "terms": lambda config, body: parse_terms(body),
     "conversion": lambda config, body: parse_conversion(body),
+    "comparison": lambda config, body: parse_compare(config, body),
 }

@@ -24,18 +24,18 @@ LONGEST_LABEL = 200  # characters
 HIGHEST_PRIORITY = 10
 
 
-class _Request(Model):
+class SceneAndSettings(Model):
     scene: Any
     settings: Any = Field(default_factory=dict)
 
 
-class RenderRequest(_Request):
+class RenderRequest(SceneAndSettings):
     label: Annotated[str, Field(max_length=LONGEST_LABEL)] | None = None
     priority: Annotated[int, Field(ge=-HIGHEST_PRIORITY, le=HIGHEST_PRIORITY)] = 0
     callback: Annotated[str, Field(max_length=LONGEST_URL)] | None = None
 
 
-_REQUEST = TypeAdapter(_Request)
+_REQUEST = TypeAdapter(SceneAndSettings)
 _RENDER_REQUEST = TypeAdapter(RenderRequest)
 
 

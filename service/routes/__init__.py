@@ -5,6 +5,8 @@ submission       how a request for a render becomes one that waits
 batches          renders that differ along axes
 batch_files      the pictures of a batch in one file
 callbacks        which ends of renders and batches were told to whom
+compare          whether two documents or pictures differ beyond noise
+compare_answers  what a comparison takes and answers
 events           the progress of renders as server-sent events
 waiting          waits that end when the client goes away
 stream           the stream's WebSocket

@@ -271,15 +271,17 @@ DOCUMENT: Responses = {200: {"description": "The document.", "content": _ANY}}
 SCENE_DOCUMENT: Responses = {
     200: {"description": "The scene.", "content": {"application/json": {"schema": reference("Scene")}}}
 }
-_RENDER: dict[str, Any] = {
+RENDER_SCHEMA: dict[str, Any] = {
     "type": "object",
     "required": ["scene"],
     "additionalProperties": False,
     "properties": {"scene": reference("Scene"), "settings": reference("Settings")},
 }
-RENDER_BODY = body(_RENDER, sphere=RENDER)
-RENDER_AGAIN: Responses = {200: {"description": "The body.", "content": {"application/json": {"schema": _RENDER}}}}
-LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | NAMED}, sphere=RENDER)
+RENDER_BODY = body(RENDER_SCHEMA, sphere=RENDER)
+RENDER_AGAIN: Responses = {
+    200: {"description": "The body.", "content": {"application/json": {"schema": RENDER_SCHEMA}}}
+}
+LASTING_RENDER_BODY = body(RENDER_SCHEMA | {"properties": RENDER_SCHEMA["properties"] | NAMED}, sphere=RENDER)
 _AXIS = {
     "anyOf": [reference("ValuesAxis"), reference("PatchesAxis"), reference("TurntableAxis")],
     "description": "What varies along it.",
@@ -287,9 +289,9 @@ _AXIS = {
 _OVER = {"type": "array", "minItems": 1, "maxItems": MOST_AXES, "items": _AXIS}
 BATCH_BODY = body(
     {
-        **_RENDER,
+        **RENDER_SCHEMA,
         "required": ["scene", "over"],
-        "properties": _RENDER["properties"] | NAMED | {"over": _OVER},
+        "properties": RENDER_SCHEMA["properties"] | NAMED | {"over": _OVER},
     },
     roughness=BATCH,
 )

@@ -49,6 +49,7 @@ NAMES = {
     "GET /v1/batches/{id}/sheet": "getBatchSheet",
     "GET /v1/batches/{id}/animation": "getBatchAnimation",
     "GET /v1/callbacks": "listCallbacks",
+    "POST /v1/compare": "compare",
     "POST /v1/materials/convert": "convertMaterial",
     "POST /v1/bsdf": "evaluateBsdf",
     "POST /v1/bsdf/albedo": "getBsdfAlbedo",

@@ -103,6 +103,17 @@ CALLBACK = {
     "error": "it answered 503",
 }
 F = [[[0.0699, 0.0545, 0.0238], [15.3, 11.9, 5.21]]]
+VERDICT = {
+    "different": True,
+    "p_value": 1.5e-10,
+    "mean_difference": -0.00211,
+    "rmse": 0.0241,
+    "psnr": 36,
+    "flip": 0.0274,
+    "ssim": 0.982,
+    "samples": {"a": 32, "b": 32},
+    "regions": [{"x": 16, "y": 16, "width": 32, "height": 32, "p_value": 1.5e-10}],
+}
 METRICS = "# TYPE sunbox_frames_total counter\nsunbox_frames_total 0.0\n"
 
 
@@ -133,6 +144,7 @@ ANSWERS: dict[str, Any] = {
     "startBatch": {"id": BATCH_ID, "renders": 3},
     "getBatch": BATCH_STATUS,
     "listCallbacks": [CALLBACK],
+    "compare": VERDICT,
     "convertMaterial": {"material": CONVERTED, "lost": []},
     "evaluateBsdf": {"f": F, "pdf": [[0.0699, 12.3]], "delta": [[]]},
     "getBsdfAlbedo": {

@@ -19,6 +19,12 @@ SCENE: dict[str, Any] = {
 RENDER: dict[str, Any] = {"scene": SCENE, "settings": {"width": 256, "height": 256, "max_samples": 16}}
 SWEEP = {"path": "/materials/coat/roughness", "values": [0.1, 0.3, 0.6]}
 BATCH: dict[str, Any] = {"scene": SCENE, "settings": {"width": 64, "height": 64, "max_samples": 16}, "over": [SWEEP]}
+_OTHER = SCENE | {"materials": SCENE["materials"] | {"coat": MATERIAL | {"roughness": 0.6}}}
+COMPARISON: dict[str, Any] = {
+    "a": {"scene": SCENE, "settings": {"width": 64, "height": 64, "max_samples": 64}},
+    "b": {"scene": _OTHER, "settings": {"width": 64, "height": 64, "max_samples": 64}},
+    "confidence": 0.999,
+}
 ASSET = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 ASSET_ID = "sha256:697b00ab13410c52a542d2e9c63711fcc04e9cbf6c0d3439a9b43cc812e6e713"
 RENDER_ID, BATCH_ID = "441087dd744f74d508321f94400431cb", "dbb92beda1a9131ab3a1c15544ea67ac"

@@ -14,7 +14,9 @@ from typing import Any
 
 from starlette.requests import Request
 
+from service.pack import Packed
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
+from service.quality import ResolvedSettings
 from service.renders.job import Job
 from service.renders.status import status
 from service.renders.store.record import IdempotencyKey, Order, StoredRender
@@ -34,6 +36,16 @@ async def one_shot(request: Request) -> Job:
     began, state = time.monotonic(), app_state(request)
     parsed = await _parsed(request, "request")
     job = await _packed(state, parsed, owner_of(request), began)
+    await state.render_queue.submit(job, listed=False)
+    return job
+
+
+async def unlisted(
+    state: AppState, owner: str, document: bytes, settings: ResolvedSettings, packed: Packed
+) -> Job:
+    """A queued render of a packed scene that is not listed; whoever asks cancels and releases it."""
+    order = Order(secrets.token_hex(ID_BYTES), owner, settings, None, 0, time.time(), len(document))
+    job = state.job(order, document, packed, 0.0)
     await state.render_queue.submit(job, listed=False)
     return job
 

@@ -97,6 +97,7 @@ opening = Pool("opening", 3, NICENESS, each=2)  # finds assets and keeps them fr
 saving = Pool("saving", 2)  # documents: the disk's time
 encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, while a person watches
 writing = Pool("writing", 2, WRITING_NICENESS)  # pictures to files: seconds for the largest
+comparing = Pool("comparing", 2, WRITING_NICENESS)  # pictures: seconds for the largest
 recording = Pool("recording", 1)  # the rows of renders, in order: the disk's time
 saving_pictures = Pool("pictures", 1)  # small ones of renders to the disk and back: milliseconds
 saving_large_pictures = Pool("large", 1, NICENESS)  # seconds for the largest, while others' renders end

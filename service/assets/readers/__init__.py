@@ -7,5 +7,6 @@ stl          STL, binary and text
 polygons     polygons -> triangles
 raw_mesh     the result of a reader, and the checks that every mesh has to pass
 mesh_checks  oddities of a mesh: repeated triangles, edges of too many, inside out
+rendered     OpenEXR files that Sunbox wrote: colour, its variance and its samples
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 """

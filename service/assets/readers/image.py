@@ -114,29 +114,42 @@ def _unfollowed(image: Any) -> Iterator[str]:
 
 def _openimageio(format: str, data: bytes, limits: AssetLimits) -> Floats:
     """EXR and Radiance as stored; a PNG of 16 bits with straight alpha, which Pillow would round to 8."""
+    _check_header(format, data, limits)
+    with _path(data) as path, _opened(format, path) as file:
+        part, names = _part(file)
+        spec = file.spec()
+        check_size(spec.width, spec.height, limits)
+        check_size(spec.full_width, spec.full_height, limits)
+        first, last = min(names), max(names) + 1
+        pixels = file.read_image(part, 0, first, last, "float")
+        if pixels is None:
+            raise ParseError(_said(file.geterror(), path))
+        picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
+        return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
+
+
+@contextmanager
+def exr_file(data: bytes, limits: AssetLimits) -> Iterator[Any]:
+    """OpenImageIO's reader of an EXR file, whose header has been checked. Raises ParseError."""
+    _check_header("exr", data, limits)
+    with _path(data) as path, _opened("exr", path) as file:
+        yield file
+
+
+@contextmanager
+def _opened(format: str, path: str) -> Iterator[Any]:
     import OpenImageIO as oiio
 
-    _check_header(format, data, limits)
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
-    with _path(data) as path:
-        file = oiio.ImageInput.open(path, config)
-        if file is None or file.format_name() != OIIO.get(format, format):
-            oiio.geterror()  # says only that no reader took it
-            raise ParseError(f"it begins as {format.upper()} does, but its header can't be read or is cut off")
-        try:
-            part, names = _part(file)
-            spec = file.spec()
-            check_size(spec.width, spec.height, limits)
-            check_size(spec.full_width, spec.full_height, limits)
-            first, last = min(names), max(names) + 1
-            pixels = file.read_image(part, 0, first, last, "float")
-            if pixels is None:
-                raise ParseError(_said(file.geterror(), path))
-            picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
-            return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
-        finally:
-            file.close()
+    file = oiio.ImageInput.open(path, config)
+    if file is None or file.format_name() != OIIO.get(format, format):
+        oiio.geterror()  # says only that no reader took it
+        raise ParseError(f"it begins as {format.upper()} does, but its header can't be read or is cut off")
+    try:
+        yield file
+    finally:
+        file.close()
 
 
 @contextmanager

@@ -16,7 +16,7 @@ import numpy as np
 
 from service.assets.errors import ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
+from service.assets.types import AssetLimits, ImageData, MeshData, RenderedPicture, SceneFile
 from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
@@ -71,31 +71,40 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
 
 
-def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
-    """With `whole` a scene file is read with its materials, lights and camera, else only its triangles."""
+Parsed = MeshData | ImageData | SceneFile | RenderedPicture
+
+
+def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> Parsed:
+    """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
+    as a render that was written with every layer."""
     from service.assets.gltf.importer import read_scene
     from service.assets.obj.importer import read_obj_scene
     from service.assets.readers.image import SIGNATURES, parse_image
+    from service.assets.readers.rendered import parse_rendered
     from service.assets.sandbox.parse_mesh import parse_mesh
 
     size = os.fstat(source).st_size
     if not size:
         raise ParseError("the file is empty")
     if format in SIGNATURES:
-        return parse_image(format, os.pread(source, size, 0), limits)
+        data = os.pread(source, size, 0)
+        return parse_rendered(data, limits) if whole else parse_image(format, data, limits)
     # The file is in memory already: it is mapped, not copied.
-    data = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
+    mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
-        return parse_mesh(format, data, limits)
-    return read_obj_scene(data, limits) if format == "zip" else read_scene(data, limits)
+        return parse_mesh(format, mapped, limits)
+    return read_obj_scene(mapped, limits) if format == "zip" else read_scene(mapped, limits)
 
 
-def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces], dict[str, Any]]:
+def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, SceneFile):
         parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
-        facts = json.dumps(vars(parsed) | {"parts": parts}).encode()
+        text = json.dumps(vars(parsed) | {"parts": parts}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
-        return {"scene": [np.frombuffer(facts, np.uint8)], "files": files}, {}
+        return {"scene": [np.frombuffer(text, np.uint8)], "files": files}, {}
+    if isinstance(parsed, RenderedPicture):
+        facts = {"samples": parsed.samples, "seed": parsed.seed, "denoised": parsed.denoised}
+        return {"layers": [parsed.layers]}, facts
     if isinstance(parsed, ImageData):
         return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
     arrays: dict[str, Pieces] = {

@@ -12,7 +12,7 @@ from typing import Any
 from service.assets.errors import ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, MeshOddities, SceneFile, ScenePart
+from service.assets.types import AssetLimits, ImageData, MeshData, MeshOddities, RenderedPicture, SceneFile, ScenePart
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
 from service.system.turns import Turns
@@ -39,6 +39,8 @@ CRASHES = {
     signal.SIGXCPU: "reading it takes more processor time than the {seconds:g} s allowed",
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
+
+Parsed = MeshData | ImageData | SceneFile | RenderedPicture
 
 # The type of each array of a mesh, and the shape of its rows.
 MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
@@ -88,7 +90,7 @@ class Sandbox:
         Raises ParseError.
         """
         parsed = self._bounded(format, source, False)
-        assert not isinstance(parsed, SceneFile)
+        assert isinstance(parsed, MeshData | ImageData)
         return parsed
 
     def parse_scene(self, format: str, source: bytes | int) -> SceneFile:
@@ -97,7 +99,13 @@ class Sandbox:
         assert isinstance(parsed, SceneFile)
         return parsed
 
-    def _bounded(self, format: str, source: bytes | int, whole: bool) -> MeshData | ImageData | SceneFile:
+    def parse_rendered(self, source: bytes | int) -> RenderedPicture:
+        """An EXR that was written with every layer of a render. Raises ParseError."""
+        parsed = self._bounded("exr", source, True)
+        assert isinstance(parsed, RenderedPicture)
+        return parsed
+
+    def _bounded(self, format: str, source: bytes | int, whole: bool) -> Parsed:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
             with self._turns.one():
@@ -106,7 +114,7 @@ class Sandbox:
             if isinstance(source, bytes):
                 os.close(fd)
 
-    def _parse(self, format: str, fd: int, whole: bool) -> MeshData | ImageData | SceneFile:
+    def _parse(self, format: str, fd: int, whole: bool) -> Parsed:
         size = os.fstat(fd).st_size
         if size > self.limits.max_file:
             raise ParseError(f"{size} bytes; {self.limits.max_file} are allowed")
@@ -177,7 +185,7 @@ def _death(child: Child, limits: AssetLimits) -> str:
     return f"reading it crashed the parser ({signal_name(code)})"
 
 
-def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
+def _result(reply: dict[str, Any], fd: int) -> Parsed:
     if "error" in reply:
         raise ParseError(str(reply["error"]), str(reply.get("pointer", "")))
     try:
@@ -186,6 +194,8 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
         os.close(fd)
     if "pixels" in arrays:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
+    if "layers" in arrays:
+        return RenderedPicture(arrays["layers"], int(reply["samples"]), int(reply["seed"]), bool(reply["denoised"]))
     if "scene" in arrays:
         return _scene(arrays["scene"], arrays["files"])
     return mesh_of(arrays, tuple(map(str, reply["warnings"])), _oddities(reply["oddities"]))

@@ -1,0 +1,199 @@
+"""A verdict on two documents or pictures: whether they differ beyond noise, where, and with which certainty."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict
+
+from service import images
+from service.assets.rendered import rendered
+from service.ipc.messages import View
+from service.pack import Packed
+from service.problems import AssetError, FieldError, InvalidDocument, NotFound, Unavailable
+from service.quality import ResolvedSettings
+from service.renders.job import Job
+from service.requests import compare_request
+from service.requests.compare_request import ParsedComparison, check_pixels, check_sizes
+from service.requests.request_parser import ParsedRequest
+from service.requests.request_reader import weight
+from service.routes import answers, compare_answers, submission, waiting
+from service.routes.errors import GONE
+from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
+from service.system.executors import comparing, opening, packing, storing
+from service.verdict import comparison
+from service.verdict.comparison import Side, Source, Still, Taken, Verdict
+from service.verdict.evidence import PIXEL_BYTES, Estimate
+from service.verdict.maps import MapKind
+
+router = APIRouter(prefix="/v1", tags=["compare"])
+
+VERDICT: answers.Responses = {
+    200: {
+        "model": compare_answers.Verdict,
+        "description": "The verdict, or a map.",
+        "content": {"image/png": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+COLOR, VARIANCE = View("color", encoding="linear"), View("variance", encoding="linear")
+ASSET = "sha256:"
+HEADER_REGIONS = 16  # in the header beside a map, which proxies bound to 8 KiB
+
+
+class CompareQuery(BaseModel):
+    """What is answered: the verdict, or a map, with the verdict in the header `Sunbox-Verdict`."""
+
+    model_config = ConfigDict(extra="forbid")
+    format: Literal["json", "png"] = "json"
+    map: MapKind = "p"
+
+
+@router.post(
+    "/compare",
+    summary="Say whether two documents or pictures differ beyond noise",
+    description="Documents are rendered with the same seeds, `a`'s, in groups of samples, until they are known to "
+    "differ or have the samples, the time or the noise that their settings allow; renders and EXR files stay as they "
+    "are. With `format=png` the answer is a map, and the verdict is in the header `Sunbox-Verdict` as JSON, with its "
+    "first 16 regions. Closing the connection ends the work.",
+    openapi_extra=compare_answers.BODY,
+    response_class=Response,
+    responses=VERDICT | answers.problems(400, 404, 409, 410, 413, 415, 422, 429, 503),
+)
+async def compare(request: Request, query: Annotated[CompareQuery, Query()]) -> Response:
+    state = app_state(request)
+    asked = await _parsed(request)
+    answered = asyncio.ensure_future(_answered(state, asked, caller_of(request), owner_of(request), query))
+    if not await waiting.until(request, answered):
+        return Response(status_code=GONE)
+    return answered.result()
+
+
+async def _parsed(request: Request) -> ParsedComparison:
+    state = app_state(request)
+    async with state.bodies.taken(request) as body:
+        state.render_queue.admit(owner_of(request))
+        await state.renderers.able(STARTING_S)
+        parsed: ParsedComparison = await state.bodies.parsed("comparison", body, caller_of(request))
+    return parsed
+
+
+async def _answered(
+    state: AppState, asked: ParsedComparison, caller: str, owner: str, query: CompareQuery
+) -> Response:
+    """Encoded where cancelling it ends the work as well."""
+    with state.memory.growing("scenes") as hold_scenes, state.memory.growing("pictures") as hold_pictures:
+        sides = _Sides(state, caller, owner, hold_scenes)
+        a, b = await sides.found(asked.a, "/a"), await sides.found(asked.b, "/b")
+        check_sizes(a.size, b.size)
+        hold_pictures(a.size[0] * a.size[1] * PIXEL_BYTES)
+        if asked.same and isinstance(a, Source):
+            verdict = comparison.same(a, asked.confidence)
+        else:
+            verdict = await comparison.compare(a, b, asked.confidence)
+        return await comparing(partial(_response, verdict, query))
+
+
+def _response(verdict: Verdict, query: CompareQuery) -> Response:
+    document = verdict.document()
+    if query.format == "json":
+        return JSONResponse(document)
+    short = document | {"regions": document["regions"][:HEADER_REGIONS]}
+    headers = {"sunbox-verdict": json.dumps(short), "cache-control": "no-store"}
+    return Response(images.encode(verdict.picture(query.map), "png"), media_type="image/png", headers=headers)
+
+
+@dataclass
+class _Sides:
+    """What a request names becomes what is compared."""
+
+    state: AppState
+    caller: str
+    owner: str
+    hold_scenes: Callable[[int], None]
+    scene_bytes: int = 0
+
+    async def found(self, side: compare_request.Side, pointer: str) -> Side:
+        if isinstance(side, ParsedRequest):
+            return await self._document(side, pointer)
+        try:
+            still = await (self._asset(side) if side.startswith(ASSET) else self._render(side))
+        except NotFound as error:
+            raise NotFound(error.detail, pointer) from None
+        except InvalidDocument as error:
+            raise error.under(pointer) from None
+        except AssetError as error:
+            raise InvalidDocument([FieldError(pointer, error.detail)]) from None
+        return still
+
+    async def _document(self, parsed: ParsedRequest, pointer: str) -> Source:
+        try:
+            check_pixels(parsed.settings.render_width, parsed.settings.render_height)
+            packed = await packing(partial(self.state.reader.pack, parsed.scene, owner=self.owner))
+        except InvalidDocument as error:
+            raise error.under(pointer) from None
+        self.scene_bytes += weight(packed)
+        self.hold_scenes(self.scene_bytes)
+        return Source(parsed.settings, partial(self._rendered, parsed.document, packed, pointer))
+
+    async def _rendered(self, document: bytes, packed: Packed, pointer: str, settings: ResolvedSettings) -> Taken:
+        """One group of samples: a render as `POST /v1/render` has it, with the same limits and turns."""
+        job = await submission.unlisted(self.state, self.owner, document, settings, packed)
+        try:
+            await job.finished.wait()
+            if job.state == "cancelled":
+                raise Unavailable("The server is shutting down.")
+            return Taken(await _estimate(job), job.elapsed_s)
+        except InvalidDocument as error:
+            raise error.under(pointer) from None
+        finally:
+            self.state.render_queue.cancel(job)
+            job.release()
+
+    async def _render(self, id: str) -> Still:
+        """A render's picture so far. Raises NotFound, Gone, Conflict, InvalidDocument."""
+        renders = self.state.render_queue
+        job = renders.get(id, self.owner)
+        settings = job.order.settings
+        check_pixels(settings.render_width, settings.render_height)
+        if settings.denoise:
+            raise _denoised()
+        with renders.looking(job):
+            return Still(await _estimate(job), settings.seed)
+
+    async def _asset(self, id: str) -> Still:
+        """An EXR file of ours. Raises NotFound, AssetError, InvalidDocument."""
+        storage = self.state.storage
+
+        def info() -> tuple[int, int]:
+            storage.access.check(self.owner, id)
+            found = storage.assets.info(id)
+            return found.width or 0, found.height or 0
+
+        check_pixels(*await opening(info, self.caller))
+        picture = await storing(partial(rendered, storage.assets, id), self.caller)
+        if picture.denoised:
+            raise _denoised()
+        color, variance = picture.layers[..., :3], picture.layers[..., 3:]
+        return Still(await comparing(partial(Estimate.of, color, variance, picture.samples)), picture.seed)
+
+
+async def _estimate(job: Job) -> Estimate:
+    """Raises Conflict before the first sample, and the render's own error where it failed."""
+    while True:
+        color, progress = await job.image(COLOR)
+        variance, after = await job.image(VARIANCE)
+        if progress.samples == after.samples:  # not so where it goes on
+            return await comparing(partial(Estimate.of, color, variance, progress.samples))
+
+
+def _denoised() -> InvalidDocument:
+    detail = "was denoised, so that its noise is not known: render it without `denoise`"
+    return InvalidDocument([FieldError("", detail)])
