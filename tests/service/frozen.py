@@ -40,7 +40,7 @@ MADE_BY = {
     "6": "5250b9c",
     "7": "2bdc3dd",
     "8": "944d792",
-    "9": "07ff23b",
+    "9": "64a7ca7",
 }
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")
