@@ -58,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains and needs"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
+    _mcp(commands.add_parser("mcp", help="serve tools for agents on stdin and stdout, by the Model Context Protocol"))
     commands.add_parser("callback-secret", help="print the secrets that sign callbacks, one a line")
     _bench(commands.add_parser("bench", help="measure"))
     return top
@@ -174,6 +175,11 @@ def _info(command: argparse.ArgumentParser) -> None:
     text = "also compile the scene's kernel and one with every feature, and measure both: a minute or more at first"
     command.add_argument("--measure", action="store_true", help=text)
     _asset_root(command)
+
+
+def _mcp(command: argparse.ArgumentParser) -> None:
+    text = "the server's address (default: SUNBOX_URL, or http://127.0.0.1:8000); SUNBOX_API_KEY is sent to it"
+    command.add_argument("--url", metavar="URL", help=text)
 
 
 def _check_data(command: argparse.ArgumentParser) -> None:

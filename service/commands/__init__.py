@@ -13,6 +13,7 @@ bsdf_figure    the figures, drawn by matplotlib
 import         a model as a document with files beside it
 info           what a scene contains, and what would render it here
 callback_secret  the secrets that sign callbacks
+mcp            tools for agents
 check_data     whether the data folder is sound
 bench          the benchmarks
 health         the container's health check

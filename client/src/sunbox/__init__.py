@@ -14,6 +14,10 @@ merge            merge patches (RFC 7386)
 progress         a line while a render goes on
 background       an event loop in a thread of its own
 document         the scene's document as types, generated from a server's schema
+mcp              `sunbox-mcp`: tools for agents, by the Model Context Protocol
+agent_tools      the eight tools
+agent_scenes     the scenes that they work on: documents and names, no files
+agent_answers    what they answer with
 generate         writes `document`
 local            `render` in this process
 
