@@ -121,14 +121,12 @@ class Callbacks:
 
     async def _run(self) -> None:
         """Send what is due, a few at a time."""
-        from service.callbacks import posting
-
         while True:
             self._woken.clear()
             try:
                 if self._tls is None:
                     self._secrets = await recording(partial(signing.secrets_of, self._config))
-                    self._tls = await resolving(posting.tls)
+                    self._tls = await resolving(_prepared)
                 pause = await self._begin()
             except ServiceError as error:
                 log.error("could not send callbacks", {"error": error})
@@ -202,3 +200,10 @@ class Callbacks:
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+
+def _prepared() -> ssl.SSLContext:
+    """Import the HTTP library, which the start does without, and read the certificates."""
+    from service.callbacks import posting
+
+    return posting.tls()

@@ -18,6 +18,7 @@ from service.config import Config
 from service.problems import InvalidDocument, NotFound, TooManyRequests
 from service.storage.callback_rows import KEPT, Callback, CallbackRows, insert
 from service.storage.database import Database
+from sunbox import Client
 from tests.calls import is_problem, metrics
 from tests.service.receiving import Heard, Receiver
 from tests.serving import ENDLESS, SCENE, SMALL, Server, kill, served, wait_until
@@ -76,6 +77,14 @@ def test_a_render_s_end_is_told_and_signed(calling: Server, listening: Receiver)
     found = listed(calling, id)
     assert found["id"] == heard.headers["webhook-id"] and (found["attempts"], found["status"]) == (1, 204)
     assert found["kind"] == "render" and found["next"] is None and found["ended"]
+
+
+def test_the_python_client_asks_for_callbacks(calling: Server, listening: Receiver) -> None:
+    with Client(calling.url) as client:
+        id = client.submit(SCENE, callback=listening.url, **SMALL).id
+        over = {"/materials/ball/roughness": [0.5]}
+        batch = client.batch(SCENE, over, callback=listening.url, **SMALL).id
+    wait_until(lambda: about(listening, id) and about(listening, batch))
 
 
 def test_a_batch_has_one_callback(calling: Server, listening: Receiver) -> None:
@@ -245,6 +254,7 @@ def test_what_is_kept_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         assert found is not None
         rows.attempted(callbacks._after(found, answer, None if answer == 200 else "it answered 410"))
     assert [each.subject for each in rows.listed("", None, 10, None)] == ["4", "3", "0"]
+    assert rows.listed("anna", None, 10, None) == []
 
 
 def test_an_owner_has_so_many_callbacks(tmp_path: Path) -> None:

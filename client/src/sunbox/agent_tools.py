@@ -43,7 +43,7 @@ from sunbox.transport import Transport
 LONGEST_S = 50.0  # of one call: many hosts give up after a minute
 TIMEOUT_S, RETRIES = 60.0, 3
 MOST_VALUES = 36  # pictures of one sheet
-MOST_PAIRS = 1024  # of directions: some 40 KB of numbers
+MOST_PAIRS = 256  # of directions: some 15 KB of numbers
 MOST_LISTED = 60  # materials
 RENDER_ID = 32  # hexadecimal digits
 
