@@ -14,6 +14,7 @@ OF_RENDERS = (
     "id", "state", "label", "created", "started", "ended", "reason", "samples", "noise", "elapsed_s", "problem",
 )  # fmt: skip
 OF_BATCHES = ("id", "state", "label", "created", "counts")
+LONGEST = 500  # characters of each part of a problem: the rest is in the render's status
 
 
 def event(ended: Job | Batch) -> str:
@@ -22,6 +23,8 @@ def event(ended: Job | Batch) -> str:
     status = ended.status()
     data: dict[str, Any] = {name: status[name] for name in names if name in status}
     if (problem := data.get("problem")) is not None:
-        data["problem"] = {name: problem[name] for name in ("type", "title", "detail") if name in problem}
+        parts = (name for name in ("type", "title", "detail") if name in problem)
+        data["problem"] = {name: str(problem[name])[:LONGEST] for name in parts}
     kind = "render.ended" if isinstance(ended, Job) else "batch.ended"
-    return json.dumps({"type": kind, "timestamp": iso(time.time()), "data": data}, separators=(",", ":"))
+    body = {"type": kind, "timestamp": iso(time.time()), "data": data}
+    return json.dumps(body, ensure_ascii=False, separators=(",", ":"))

@@ -81,10 +81,13 @@ def test_a_render_s_end_is_told_and_signed(calling: Server, listening: Receiver)
 
 def test_the_python_client_asks_for_callbacks(calling: Server, listening: Receiver) -> None:
     with Client(calling.url) as client:
-        id = client.submit(SCENE, callback=listening.url, **SMALL).id
+        id = client.submit(SCENE, "\N{TEAPOT}" * 200, callback=listening.url, **SMALL).id
         over = {"/materials/ball/roughness": [0.5]}
         batch = client.batch(SCENE, over, callback=listening.url, **SMALL).id
     wait_until(lambda: about(listening, id) and about(listening, batch))
+    (heard,) = about(listening, id)
+    assert heard.event["data"]["label"] == "\N{TEAPOT}" * 200 and len(heard.body) < 4096
+    assert Webhook(SECRET).verify(heard.body, heard.headers)
 
 
 def test_a_batch_has_one_callback(calling: Server, listening: Receiver) -> None:
