@@ -38,7 +38,10 @@ export function laterParts({
   );
 
   const comparison = new OnDemand(
-    () => import("./picture/compare.js"),
+    async () => {
+      const [module] = await Promise.all([import("./compare/comparison.js"), useSheet("compare.css")]);
+      return module;
+    },
     ({ Comparison }) =>
       new Comparison(
         {
@@ -53,7 +56,6 @@ export function laterParts({
           acts: editor,
           models: Object.keys(materialModels(schema.scene)),
           names: namesOf,
-          lost: () => {},
           beside: () => stream.session,
           headerOfA: () => page.header,
         },
@@ -109,7 +111,7 @@ export function laterParts({
       return module;
     },
     async ({ FinalPictures }) => {
-      const [compared, made] = await Promise.all([comparison.get(), recipes.get()]);
+      const made = await recipes.get();
       return new FinalPictures({
         find,
         schema,
@@ -119,7 +121,7 @@ export function laterParts({
         messages,
         recipes: made,
         title,
-        compareWith: compared.compareWith ? (render) => compared.compareWith(render) : null,
+        compareWith: (render) => editor.compareWith(render),
         complain,
         say,
       });

@@ -13,7 +13,7 @@ import { laterParts } from "./later.js";
 import { LobeOnDemand } from "./lobe/on-demand.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
-import { entire, visible } from "./document/outline.js";
+import { entire } from "./document/outline.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
 import { Preparing } from "./panels/preparing.js";
@@ -22,7 +22,7 @@ import { offerUndo } from "./panels/replaced.js";
 import { SavedMaterials } from "./panels/saved-materials.js";
 import { modelNames } from "./server/schema.js";
 import { essence } from "./document/share.js";
-import { sceneOfB } from "./document/variants.js";
+import { compared } from "./document/variants.js";
 import { Shelf } from "./panels/shelf.js";
 import { Status } from "./panels/status.js";
 import { Stream } from "./server/stream.js";
@@ -276,14 +276,14 @@ function tellState() {
 // Tells the streams what is wanted, and the page how things stand.
 function push() {
   if (!page.info) return;
-  const sceneB = sceneOfB(editor.state);
   const { wanted } = page;
-  if (sceneB && !comparison.now) comparison.get().catch(complain);
-  comparison.now?.show(sceneB && { ...wanted, scene: visible(sceneB, editor.state.chosen.hidden) }, page.isPaused);
+  const isCompared = compared(editor.state) !== null;
+  if (isCompared && !comparison.now) comparison.get().catch(complain);
+  comparison.now?.show(isCompared ? wanted : null, page.isPaused);
   stream.show(wanted);
   root.style.setProperty("--ratio", String(wanted.settings.width / wanted.settings.height));
   root.classList.toggle("checker", page.isCheckered);
-  find("compare").setAttribute("aria-pressed", String(sceneB !== null));
+  find("compare").setAttribute("aria-pressed", String(isCompared));
   tellState();
 }
 

@@ -257,12 +257,20 @@ export class Editor extends Store {
 
   // --- two variants ---
 
+  // What B is and whether it is edited, or null where it is not seen.
   get compared() {
-    return variants.compared(this.state);
+    return variants.comparedB(this.state);
   }
 
   startComparing() {
     this.change(variants.begun(this.state));
+  }
+
+  // A render of the server's at the right of the picture.
+  compareWith({ id }) {
+    const begun = { ...this.state, ...variants.begun(this.state) };
+    const { compare } = variants.placed(begun, "left", "a");
+    this.change({ ...begun, ...variants.placed({ compare }, "right", variants.RENDER + id) });
   }
 
   stopComparing() {

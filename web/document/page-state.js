@@ -2,7 +2,7 @@
 // it is paused, connected, done; the size and the limit that hold for the next one.
 
 import { visible } from "./outline.js";
-import { sceneOfB } from "./variants.js";
+import { compared, rendered } from "./variants.js";
 import { inWords } from "../lib/format-text.js";
 import { defaults } from "../server/schema.js";
 import { DISPLAY, contained, pictureSize, viewOf } from "./picture-view.js";
@@ -24,7 +24,7 @@ export class PageState {
   header = null; // of the frame on the canvas
   knobs = {}; // what the chosen quality makes of the settings that are not given
 
-  // `root` is the element of the picture; `fit(box)` gives the part of a box that one of two variants has.
+  // `root` is the element of the picture; `fit(box)` gives the part of a box that one of two pictures has.
   constructor({ schema, editor, ui, root, fit }) {
     Object.assign(this, { schema, editor, ui, root, fit });
     this.viewDefaults = defaults(schema.view, schema.view, DISPLAY);
@@ -65,8 +65,8 @@ export class PageState {
     const { width, height } = this.editor.state.settings;
     const stageBox = this.root.getBoundingClientRect();
     const box = width && height ? contained(stageBox, { width, height }) : stageBox;
-    if (!sceneOfB(this.editor.state)) return pictureSize(box, window.devicePixelRatio, area);
-    return pictureSize(this.fit(box), window.devicePixelRatio, area / 2); // two variants share what one may cost
+    // Those that are rendered at a time share what one may cost.
+    return pictureSize(this.fit(box), window.devicePixelRatio, area / rendered(this.editor.state));
   }
 
   // The settings as the stream is given them.
@@ -79,7 +79,7 @@ export class PageState {
     const view = viewOf({ ...this.ui.state, checkered: this.isCheckered }, this.view, {
       isPaused: this.isPaused,
       quality: PAUSED_QUALITY,
-      isExact: sceneOfB(this.editor.state) !== null,
+      isExact: compared(this.editor.state) !== null,
     });
     const { scene, chosen } = this.editor.state;
     return { scene: visible(scene, chosen.hidden), settings: this.settings, view };

@@ -1,6 +1,7 @@
 // What a page shows, as text that fits into a link: the state, packed; and back.
 
 import { fetchSaved, save } from "../server/api.js";
+import { shareable } from "./variants.js";
 
 const LONGEST = 8000; // characters of a fragment that chat programs still pass on
 const MEMBERS = ["scene", "settings", "view", "compare", "chosen"];
@@ -37,7 +38,7 @@ export async function unpack(text) {
 
 // A link that reopens the very view. What is too long for a link goes to the server as a document of its own.
 export async function linkTo(state) {
-  const { scene, ...rest } = essence(state);
+  const { scene, ...rest } = essence({ ...state, compare: shareable(state.compare) });
   const url = new URL(location.href);
   url.hash = `v=${await pack({ scene, ...rest })}`;
   if (url.hash.length <= LONGEST) return url.href;

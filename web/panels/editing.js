@@ -1,10 +1,10 @@
 // What the inspector is headed with while two variants are compared: which of them the hand changes, in its tint.
 
-import { compared } from "../document/variants.js";
+import { comparedB } from "../document/variants.js";
 import { inWords } from "../lib/format-text.js";
 
 export function showEditing(find, state) {
-  const compare = compared(state);
+  const compare = comparedB(state);
   const isOn = compare !== null && compare.material === state.chosen.material;
   find("editing").hidden = !isOn;
   delete find("panel").dataset.editing;

@@ -5,8 +5,7 @@ import { ask } from "../lib/ask.js";
 import { element, freshId } from "../lib/dom.js";
 import { WHOSE } from "./saved-materials.js";
 import { dismiss, recallAll, remember } from "../lib/browser-storage.js";
-
-const SNAPSHOT = "snapshot ";
+import { SNAPSHOT } from "../document/variants.js";
 
 const button = (label, does, more = {}) =>
   element("button", { type: "button", class: "button small", onclick: does, ...more }, label);

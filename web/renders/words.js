@@ -6,7 +6,7 @@ import { times } from "./sizes.js";
 const dayOf = (date) => date.toDateString();
 
 // "14:32", or "3 Nov, 14:32" on another day.
-function momentOf(created, now = new Date()) {
+export function momentOf(created, now = new Date()) {
   const date = new Date(created);
   const time = date.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
   if (dayOf(date) === dayOf(now)) return time;
