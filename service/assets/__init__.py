@@ -17,6 +17,7 @@ sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF
 obj           the importer of OBJ files with materials and textures
+texture_sets  the importer of images that make materials by their names
 scenes        parts that the importers of whole scenes share
 """
 

@@ -12,7 +12,7 @@ KINDS: dict[str, Kind] = {
     "stl": "mesh",
     "glb": "scene",
     "gltf": "scene",
-    "zip": "scene",
+    "zip": "scene",  # or "materials", by what is in it
     "exr": "image",
     "hdr": "image",
     "png": "image",

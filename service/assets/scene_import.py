@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from service.assets.types import SceneFile, ScenePart
+from service.assets.types import Kind, SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
 IMPORTER = 4  # raised when files must be imported anew, because their documents or warnings change
@@ -44,6 +44,10 @@ class Imported:
     def scene(self, environment: dict[str, Any]) -> dict[str, Any]:
         """The document; under `environment` where the file has no light."""
         return self.document if self.lit else {**self.document, "environment": environment}
+
+    @property
+    def kind(self) -> Kind:
+        return "scene" if self.document["shapes"] else "materials"
 
     def references(self) -> set[str]:
         """The assets that the document needs."""

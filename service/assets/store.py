@@ -20,7 +20,7 @@ from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
 from service.assets.scenes.plain_mesh import plain_scene
 from service.assets.source import Source, digest, for_sandbox, format_of, length
-from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
+from service.assets.types import AssetInfo, AssetLimits, ImageData, Kind, MeshData, ScenePart
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from service.system.confined import Rights
 from service.system.disk_usage import Usage, expected
@@ -30,9 +30,11 @@ log = logging.getLogger(__name__)
 
 ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
-    "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures; "
+    "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
+    "make materials by their names; "
     "EXR, Radiance HDR, PNG, JPEG and WebP images"
 )
+TAKEN_APART: tuple[Kind, ...] = ("scene", "materials")  # kinds of files whose parts are assets of their own
 RECORD_BYTES = 512  # about the size of an asset's record
 
 Room = Callable[[Usage], AbstractContextManager[None]]
@@ -123,21 +125,36 @@ class AssetStore:
         Raises NotFound, AssetError, Unavailable.
         """
         info = self.info(id)
-        if info.kind == "image":
-            raise NotFound(f"{id[:100]} is an image: only meshes and scene files can be shown as a scene")
+        if info.kind in ("image", "materials"):
+            what = "is an image" if info.kind == "image" else "holds materials"
+            raise NotFound(f"{id[:100]} {what}: only meshes and scene files can be shown as a scene")
         if info.kind == "mesh":
             document, remark = plain_scene(id, self.mesh(id))
             said = [] if remark is None else [{"pointer": "", "detail": remark}]
             return Imported(document, [*said, *(info.warnings or ())], lit=False)
-        imported = self._imported(id)
-        if imported is None:  # the file itself still exists: import it again
-            with self.opened(id) as source:
-                imported = self._import(id, info.format, source, False)[1]
+        return self._imported_again(info)
+
+    def materials(self, id: str) -> Imported:
+        """A zip of images, or a scene's file, as a document that has materials and their textures.
+
+        Raises NotFound, AssetError, Unavailable.
+        """
+        info = self.info(id)
+        if info.kind not in TAKEN_APART:
+            raise NotFound(f"{id[:100]} is {'an' if info.kind == 'image' else 'a'} {info.kind} and has no materials")
+        return self._imported_again(info)
+
+    def _imported_again(self, info: AssetInfo) -> Imported:
+        """What a file was imported as; where some of that is missing, it is imported from the file again."""
+        imported = self._imported(info.id)
+        if imported is None:
+            with self.opened(info.id) as source:
+                imported = self._import(info.id, info.format, source, False)[1]
         return imported
 
     def parts(self, info: AssetInfo) -> list[str]:
         """The id of an asset and, for a scene, those of the assets that it was imported as."""
-        imported = self._imported(info.id) if info.kind == "scene" else None
+        imported = self._imported(info.id) if info.kind in TAKEN_APART else None
         return [info.id, *(imported.references() if imported else ())]
 
     def read(self, id: str) -> bytes:
@@ -221,7 +238,7 @@ class AssetStore:
         with room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
             imported = take_apart(file, self._store_part)
             info = AssetInfo(
-                id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,
+                id, imported.kind, format, size, triangles=file.triangles or None, warnings=imported.warnings or None,
                 exposure=imported.exposure, aspect_ratio=imported.aspect_ratio, bounds=file.bounds,
             )  # fmt: skip
             if new:
@@ -309,7 +326,7 @@ class AssetStore:
         """Whether all that was stored of an asset is intact, with the parts of a scene."""
         if not self._is_sound(info.id, again=True):
             return False
-        return info.kind != "scene" or self._imported(info.id, again=True) is not None
+        return info.kind not in TAKEN_APART or self._imported(info.id, again=True) is not None
 
     def _is_sound(self, id: str, again: bool = False) -> bool:
         try:
@@ -326,6 +343,8 @@ class AssetStore:
             info = AssetInfo(**json.loads(self._files.file(id, RECORD).read_bytes()))
             if self._files.file(id).stat().st_size != info.bytes:
                 return None  # the power failed before all of it was on the disk
+            if info.kind == "materials":
+                return info
             return replace(info, kind=KINDS[info.format])  # an older version recorded glTF files as meshes
         except (OSError, ValueError, TypeError, KeyError):
             return None

@@ -9,7 +9,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
-Kind = Literal["mesh", "image", "scene"]
+Kind = Literal["mesh", "image", "scene", "materials"]
 
 
 @dataclass(frozen=True)

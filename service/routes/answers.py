@@ -189,6 +189,12 @@ class Asset(BaseModel):
     )
 
 
+class MaterialSet(BaseModel):
+    materials: dict[str, Any]
+    textures: dict[str, Any] = Field(description="All that the materials show, by name.")
+    warnings: list[AssetWarning] = Field(description="Which of its images are not used, and why.")
+
+
 class ConvertedMaterial(BaseModel):
     material: dict[str, Any]
     lost: list[str] = Field(description="Names of the given parameters that have no part in it.")

@@ -35,7 +35,7 @@ HEADER_BYTES = 4096  # proxies refuse headers that are much longer
 @router.post(
     "",
     status_code=201,
-    summary="Upload a mesh, an image, or a scene: glTF, or a zip of an OBJ with its materials",
+    summary="Upload a mesh, an image, a scene (glTF, or a zip of an OBJ with its materials), or a zip of textures",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
     responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
@@ -98,6 +98,29 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     while len(text := json.dumps(warnings)) > HEADER_BYTES:
         warnings = warnings[: len(warnings) * 2 // 3]
     return text
+
+
+@router.get(
+    "/{id}/materials",
+    summary="The materials of a zip of textures, or of a scene's file, with the textures that they show",
+    response_class=JSONResponse,
+    responses=answers.shaped(answers.MaterialSet, "The materials, by name.") | answers.problems(404, 422),
+)
+async def materials(request: Request, id: answers.AssetId) -> Response:
+    """The images are assets here. What each image of a zip is of is said by the words of its file name."""
+
+    storage, owner = app_state(request).storage, owner_of(request)
+
+    def read() -> str:
+        storage.access.check(owner, id)
+        imported = storage.assets.materials(id)
+        storage.shares.imported(owner, id, imported.references())
+        document = imported.document
+        return dump_json(
+            {"materials": document["materials"], "textures": document["textures"], "warnings": imported.warnings}
+        )
+
+    return Response(await storing(read, caller_of(request)), media_type="application/json")
 
 
 @router.get(

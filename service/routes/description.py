@@ -29,6 +29,7 @@ NAMES = {
     "POST /v1/assets": "uploadAsset",
     "GET /v1/assets/{id}": "downloadAsset",
     "GET /v1/assets/{id}/scene": "getAssetScene",
+    "GET /v1/assets/{id}/materials": "getAssetMaterials",
     "GET /v1/documents/{kind}": "listDocuments",
     "GET /v1/documents/{kind}/{name}": "getDocument",
     "PUT /v1/documents/{kind}/{name}": "saveDocument",

@@ -132,6 +132,11 @@ ANSWERS: dict[str, Any] = {
     "getPreset": SCENE,
     "uploadAsset": UPLOADED,
     "getAssetScene": SCENE,
+    "getAssetMaterials": {
+        "materials": {"oak": {"type": "principled", "base_color": {"texture": "oak_color"}}},
+        "textures": {"oak_color": {"asset": ASSET_ID, "color_space": "srgb"}},
+        "warnings": [{"pointer": "oak_ao.jpg", "detail": "ambient occlusion is left out"}],
+    },
     "listDocuments": [NAMED],
     "getDocument": MATERIAL,
     "saveDocument": NAMED,

@@ -40,9 +40,7 @@ async def one_shot(request: Request) -> Job:
     return job
 
 
-async def unlisted(
-    state: AppState, owner: str, document: bytes, settings: ResolvedSettings, packed: Packed
-) -> Job:
+async def unlisted(state: AppState, owner: str, document: bytes, settings: ResolvedSettings, packed: Packed) -> Job:
     """A queued render of a packed scene that is not listed; whoever asks cancels and releases it."""
     order = Order(secrets.token_hex(ID_BYTES), owner, settings, None, 0, time.time(), len(document))
     job = state.job(order, document, packed, 0.0)

@@ -78,10 +78,10 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> Parsed
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
     from service.assets.gltf.importer import read_scene
-    from service.assets.obj.importer import read_obj_scene
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.readers.rendered import parse_rendered
     from service.assets.sandbox.parse_mesh import parse_mesh
+    from service.assets.sandbox.parse_zip import parse_zip
 
     size = os.fstat(source).st_size
     if not size:
@@ -93,7 +93,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> Parsed
     mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
         return parse_mesh(format, mapped, limits)
-    return read_obj_scene(mapped, limits) if format == "zip" else read_scene(mapped, limits)
+    return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits)
 
 
 def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
