@@ -1,7 +1,7 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, glTF and zipped OBJ a scene, JSON what it says it is.
+// images textures, several of one set a material, glTF and zipped OBJ a scene, JSON what it says it is.
 
-import { fetchAssetScene, upload } from "./server/api.js";
+import { fetchAssetMaterials, fetchAssetScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
 import { accepted, browse, kindOf } from "./lib/files.js";
@@ -14,11 +14,15 @@ import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
 import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
+import { collected, placed, thingFor } from "./texture-set.js";
+import { zip } from "./lib/zip.js";
 
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
 
 const ACCEPT = accepted(ORDER);
+
+const isZip = (file) => file.name.toLowerCase().endsWith(".zip");
 
 const stem = (file) =>
   file.name
@@ -45,6 +49,7 @@ export class Importer {
     const known = [...files].sort((a, b) => ORDER.indexOf(kindOf(a)) - ORDER.indexOf(kindOf(b)));
     // An image that comes with a mesh is for that, wherever they fell.
     const place = known.some((file) => ["mesh", "scene"].includes(kindOf(file))) ? null : at;
+    if (await this.#takeImages(known, at)) return;
     let next = way;
     for (const file of known) {
       try {
@@ -52,6 +57,23 @@ export class Importer {
       } catch (problem) {
         this.#refuse(file, problem);
       }
+      this.messages.hide("upload");
+    }
+  }
+
+  // Whether several images were a texture set: the server knows by their names.
+  async #takeImages(files, at) {
+    const isImage = (file) => ["image", "light"].includes(kindOf(file));
+    if (!files.every(isImage) || files.filter((file) => kindOf(file) === "image").length < 2) return false;
+    try {
+      const archive = await zip(files, `${files.length} images`);
+      await this.#takeMaterials(await this.upload(archive), archive, at);
+      return true;
+    } catch (problem) {
+      if (problem.status === 422) return false; // one after the other, then
+      this.#refuse({ name: `${files.length} images` }, problem);
+      return true;
+    } finally {
       this.messages.hide("upload");
     }
   }
@@ -73,9 +95,12 @@ export class Importer {
       this.reopen(recipe, stem(file));
       return true;
     }
+    // What a zip holds is known when it is there.
+    const zipped = isZip(file) ? await this.upload(file) : null;
+    if (zipped?.kind === "materials") return this.#takeMaterials(zipped, file, at);
     const chosen = kind === "scene" ? (way ?? (await this.#ask(file))) : way;
     if (kind === "scene" && chosen === null) return false;
-    const info = await this.upload(file);
+    const info = zipped ?? (await this.upload(file));
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
     if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
     if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
@@ -93,6 +118,22 @@ export class Importer {
         { label: "Open", value: "open" },
       ],
     });
+  }
+
+  async #takeMaterials({ id }, file, at) {
+    const { warnings, ...set } = await fetchAssetMaterials(id);
+    const materials = unpacked(set);
+    const thing = await thingFor(at, { controller: this.controller, state: this.acts.state });
+    this.acts.change(collected(this.acts.state, thing, materials));
+    const isOne = materials.length === 1;
+    const lines = materials.flatMap((each) => {
+      const known = fields(this.schema, materialModels(this.schema)[each.material.type]);
+      return placed(each, Object.fromEntries(known.map(({ name, title }) => [name, title])), isOne);
+    });
+    const left = warnings.map(({ pointer: image, detail }) => `${image}: ${detail}.`);
+    const what = isOne ? `is the material ${materials[0].name}.` : `are ${materials.length} materials.`;
+    this.messages.show("import", { title: `${file.name} ${what}`, list: [...lines, ...left] });
+    return false;
   }
 
   async #takeImage(info, file, at) {

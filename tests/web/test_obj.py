@@ -35,6 +35,5 @@ def test_a_zip_becomes_a_scene_with_its_materials(editor: Editor) -> None:
 def test_a_zip_without_a_model_is_refused_in_words(editor: Editor) -> None:
     before = editor.settled()
     editor.drop("#stage", {"nothing.zip": zipped({"readme.txt": "hello"})})
-    editor.page.click("dialog[open] [value=open]")
     editor.wait("the refusal", lambda: "nothing.zip was not taken" in editor.text("#messages"))
     assert not editor.differs(before, 8)

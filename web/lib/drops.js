@@ -5,7 +5,9 @@ export function watchDrops(page, { take, tell }) {
   page.addEventListener("dragenter", (event) => {
     if (!isFiles(event)) return;
     depth += 1;
-    tell("Scenes (GLB, JSON, a zipped OBJ), meshes (OBJ, PLY, STL), light (HDR, EXR), images (PNG, JPEG)");
+    tell(
+      "Scenes (GLB, JSON, a zipped OBJ), meshes (OBJ, PLY, STL), light (HDR, EXR), images and texture sets (PNG, JPEG, ZIP)",
+    );
   });
   page.addEventListener("dragleave", (event) => {
     if (isFiles(event) && (depth -= 1) <= 0) tell(null);

@@ -55,6 +55,7 @@ export const save = (kind, title, document, query = {}) =>
 export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
 export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`)).blob();
+export const fetchAssetMaterials = (id) => get(`assets/${id}/materials`);
 export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 
 // A small picture of a scene, as a PNG.

@@ -1,0 +1,68 @@
+"""Images of one set, zipped or several at once, that are dropped on a thing make its material."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tests.asset_files import png
+from tests.obj_files import zipped
+from tests.web.conftest import Editor
+from tests.web.editing import document, overlay
+
+GREEN = np.full((8, 8, 3), (0, 200, 0), np.uint8)
+GREY = np.full((8, 8, 1), 90, np.uint8)
+FLAT = np.full((8, 8, 3), (128, 128, 255), np.uint8)
+SET = {
+    "Moss_2K_Color.png": GREEN,
+    "Moss_2K_Roughness.png": GREY,
+    "Moss_2K_NormalDX.png": FLAT,
+    "Moss_2K_AO.png": GREY,
+}
+
+
+def is_green(editor: Editor) -> bool:
+    height, width = overlay(editor, "picture").shape[:2]
+    r, g, _, _ = overlay(editor, "picture")[height // 2, width // 2]
+    return bool(g > 1.5 * r)
+
+
+def test_a_zipped_set_is_the_material_of_what_it_falls_on(editor: Editor) -> None:
+    before = editor.settled()
+    scene = document(editor)
+    editor.drop("#stage", {"moss.zip": zipped({name: png(texels) for name, texels in SET.items()})})
+    editor.wait("what went where", lambda: "moss.zip is the material Moss." in editor.text("#messages"))
+    said = editor.text("#messages")
+    assert "Base colour: Moss_2K_Color" in said and "Roughness: Moss_2K_Roughness" in said
+    assert "Moss_2K_AO.png" in said, "what is left out is listed"
+    editor.wait("a green ball", lambda: is_green(editor))
+    made = document(editor)
+    material = made["materials"][made["shapes"][0]["material"]]
+    assert set(material) == {"type", "base_color", "roughness", "normal_map"}
+    assert len(made["textures"]) == 3
+    editor.page.keyboard.press("Control+z")
+    editor.wait("all as before", lambda: not editor.differs(before, 8))
+    assert document(editor) == scene, "one undo takes all of it back"
+
+
+def test_several_images_are_a_set_by_their_names(editor: Editor) -> None:
+    editor.settled()
+    files = {name: png(texels) for name, texels in SET.items()}
+    editor.drop("#stage", files)
+    editor.wait("what went where", lambda: "4 images is the material Moss." in editor.text("#messages"))
+    editor.wait("a green ball", lambda: is_green(editor))
+    count = len(document(editor)["materials"])
+    editor.drop("#stage", {"one.png": png(GREY), "two.png": png(GREEN // 2)})  # no set: each is a base colour
+    editor.wait("the last of them", lambda: "two" in editor.text("[data-field=base_color] .texture"))
+    assert len(document(editor)["materials"]) == count
+    (refused,) = editor.complaints  # the browser's own line on the server's answer that they are no set
+    assert "422" in refused
+    editor.complaints.clear()
+
+
+def test_two_sets_in_a_zip_are_two_materials(editor: Editor) -> None:
+    editor.settled()
+    both = {"Moss_Color.png": png(GREEN), "Ash_Color.png": png(GREY), "Ash_Roughness.png": png(GREY)}
+    editor.drop("#stage", {"two.zip": zipped(both)})
+    editor.wait("what went where", lambda: "two.zip are 2 materials." in editor.text("#messages"))
+    names = editor.page.locator("#materials [role=option]").all_text_contents()
+    assert "Moss" in names and "Ash, Roughness: Ash_Roughness" in editor.text("#messages")

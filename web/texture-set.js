@@ -1,0 +1,43 @@
+// Images whose names say what they are of, which make a material with its textures.
+
+import { dressed } from "./document/dressing.js";
+import { received, withTextures } from "./document/material-set.js";
+import { fresh } from "./document/materials.js";
+import { inWords } from "./lib/format-text.js";
+import { pointer } from "./lib/patch.js";
+
+// The state with all of these materials: the first on the thing, the others, and without a thing all of them, on the
+// shelf alone.
+export function collected(state, thing, materials) {
+  const [first, ...others] = materials;
+  const onThing = thing && dressed(state, thing, { document: alone(first), wanted: first.name });
+  let scene = onThing ? onThing.scene : state.scene;
+  let chosen = onThing?.material;
+  for (const { name, ...set } of onThing ? others : materials) {
+    const { material, textures } = received(scene, set);
+    const free = fresh(name, scene.materials);
+    scene = { ...withTextures(scene, textures), materials: { ...scene.materials, [free]: material } };
+    chosen ??= free;
+  }
+  return { scene, chosen: { ...state.chosen, ...(thing ? { thing } : {}), material: chosen } };
+}
+
+const alone = ({ name, material, textures }) => ({ materials: { [name]: material }, textures });
+
+// What went where: a line for each parameter that shows an image.
+export function placed({ name, material }, titles, isOne) {
+  const shown = Object.entries(material).filter(([, value]) => value?.texture);
+  const lines = shown.map(([key, { texture, channel }]) => {
+    const from = channel ? `${texture} (${channel.toUpperCase()})` : texture;
+    return `${titles[key] ?? inWords(key)}: ${from}`;
+  });
+  return isOne ? lines : lines.map((line) => `${name}, ${line}`);
+}
+
+// The thing that a set is for: what lies where it was dropped, else what is selected.
+export async function thingFor(at, { controller, state }) {
+  const { thing } = state.chosen;
+  if (!at) return thing?.startsWith("/shapes/") ? thing : null;
+  const shape = await controller.shapeAt(at.x, at.y).catch(() => null); // no picture yet: it goes onto the shelf
+  return shape === null ? null : pointer("shapes", shape);
+}
