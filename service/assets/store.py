@@ -132,20 +132,16 @@ class AssetStore:
             document, remark = plain_scene(id, self.mesh(id))
             said = [] if remark is None else [{"pointer": "", "detail": remark}]
             return Imported(document, [*said, *(info.warnings or ())], lit=False)
-        return self._imported_again(info)
+        return self.materials(id)
 
     def materials(self, id: str) -> Imported:
-        """A zip of images, or a scene's file, as a document that has materials and their textures.
+        """A zip of images, or a scene's file, as a document, which has materials and their textures.
 
         Raises NotFound, AssetError, Unavailable.
         """
         info = self.info(id)
         if info.kind not in TAKEN_APART:
             raise NotFound(f"{id[:100]} is {'an' if info.kind == 'image' else 'a'} {info.kind} and has no materials")
-        return self._imported_again(info)
-
-    def _imported_again(self, info: AssetInfo) -> Imported:
-        """What a file was imported as; where some of that is missing, it is imported from the file again."""
         imported = self._imported(info.id)
         if imported is None:
             with self.opened(info.id) as source:
@@ -215,27 +211,20 @@ class AssetStore:
     def close(self) -> None:
         self.loader.close()
 
+    @collector_paused()
     def _import(
         self, id: str, format: str, data: Source, new: bool, room: Room | None = None, title: str | None = None
-    ) -> tuple[AssetInfo, Imported]:
-        with collector_paused():
-            return self._import_whole(
-                id, format, data, new, room or self._room, title or f"the {format.upper()} file"
-            )
-
-    def _import_whole(
-        self, id: str, format: str, data: Source, new: bool, room: Room, title: str
     ) -> tuple[AssetInfo, Imported]:
         """Store the parts of a scene and its document, and the file itself if it is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, for_sandbox(data))
         except ParseError as error:
-            raise refused(title, error) from None
+            raise refused(title or f"the {format.upper()} file", error) from None
         size = length(data)
         # References to the parts, which are about as long as a record, are added to the document.
         text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])
         parts = [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
-        with room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
+        with (room or self._room)(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
             imported = take_apart(file, self._store_part)
             info = AssetInfo(
                 id, imported.kind, format, size, triangles=file.triangles or None, warnings=imported.warnings or None,

@@ -133,7 +133,7 @@ ANSWERS: dict[str, Any] = {
     "uploadAsset": UPLOADED,
     "getAssetScene": SCENE,
     "getAssetMaterials": {
-        "materials": {"oak": {"type": "principled", "base_color": {"texture": "oak_color"}}},
+        "materials": {"oak": MATERIAL | {"base_color": {"texture": "oak_color"}}},
         "textures": {"oak_color": {"asset": ASSET_ID, "color_space": "srgb"}},
         "warnings": [{"pointer": "oak_ao.jpg", "detail": "ambient occlusion is left out"}],
     },
