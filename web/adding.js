@@ -7,7 +7,7 @@ import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { lampShape, standOf, subjectOf } from "./document/lamps.js";
 import { ballOf, solids, union, wayOut } from "./document/placing.js";
-import { groundUnder, isStage } from "./document/stage.js";
+import { staged } from "./document/stage.js";
 import { moved } from "./document/transforms.js";
 import { add, cross, normalize, scale, turn } from "./lib/vector.js";
 
@@ -37,7 +37,7 @@ export class Adder {
   // One of `additions`.
   async add({ kind, title, make, shines, carries }) {
     const { acts } = this;
-    if (carries) return this.#addGround();
+    if (carries) return this.stage("ground");
     if (shines) return this.#addLight(title, shines);
     const { materials } = acts.state.scene;
     const material = fresh(title.toLowerCase(), materials);
@@ -45,22 +45,14 @@ export class Adder {
     return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: !isFlat(made) });
   }
 
-  // Has all things stand on a ground, in the place of the one that there was.
-  async #addGround() {
+  // Has all things stand on a "ground" or a "cyclorama", in the place of the one that there was; "none" takes it away.
+  async stage(kind) {
     const boxes = await this.controller.boxes();
-    const { acts } = this;
-    const { scene, chosen } = acts.state;
-    const bodies = boxes.filter(
-      (each, i) => each && scene.shapes[i] && !isFlat(scene.shapes[i]) && !isStage(scene.shapes[i]),
-    );
-    const before = scene.shapes.find(isStage);
-    const material = before?.material ?? fresh("stage", scene.materials);
-    const around = bodies.length ? union(bodies) : sizeOf({ shapes: [] }, acts.camera);
-    const shapes = [...scene.shapes.filter((shape) => !isStage(shape)), groundUnder(around, material)];
-    acts.change({
-      scene: { ...scene, shapes, materials: { [material]: acts.plainMaterial, ...scene.materials } },
-      chosen: { ...chosen, thing: pointer("shapes", shapes.length - 1), material },
-    });
+    try {
+      this.acts.change(await staged(this.acts, boxes, kind));
+    } catch (problem) {
+      this.acts.complain(problem);
+    }
   }
 
   // A light that is aimed at the selection, from a side where none is, and half a stop over what is there.

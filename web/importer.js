@@ -12,6 +12,7 @@ import { fileValueWords, problemText, warningText } from "./server/problem-text.
 import { readRecipe } from "./document/recipe.js";
 import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
+import { grounded } from "./document/stage.js";
 import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
 import { collected, placed, thingFor } from "./texture-set.js";
@@ -183,8 +184,10 @@ export class Importer {
   async #takeScene({ id, bounds, exposure, warnings = [] }, file, way) {
     const document = await fetchAssetScene(id);
     if (way === "add") return this.#addScene(document, file, { bounds, warnings });
-    if (bounds) remember(document.shapes, { low: bounds[0], high: bounds[1] });
-    this.acts.openScene(document, stem(file), exposure);
+    const whole = bounds && { low: bounds[0], high: bounds[1] };
+    if (whole) remember(document.shapes, whole);
+    const standing = whole ? grounded(document, whole, this.acts.plainMaterial) : document;
+    this.acts.openScene(standing, stem(file), exposure);
     const taken =
       exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
     const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
@@ -223,7 +226,9 @@ export class Importer {
   async #takeMesh({ id, bounds, warnings = [] }, file, way) {
     measure(id, bounds);
     const isOpened = way === "open";
-    if (isOpened) this.acts.openScene(await this.#alone(id, stem(file)), stem(file));
+    const whole = { low: bounds[0], high: bounds[1] };
+    const alone = async () => grounded(await this.#alone(id, stem(file)), whole, this.acts.plainMaterial);
+    if (isOpened) this.acts.openScene(await alone(), stem(file));
     else await this.adder.addMesh(id, stem(file));
     this.#tell(file, warnings, "taken as it is.");
     return isOpened;

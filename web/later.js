@@ -105,6 +105,20 @@ export function laterParts({
   for (const id of ["page-save", "export-menu", "readings"]) menus.opens(find(id));
   menus.answers(find("share"));
 
+  const stage = new OnDemand(
+    () => import("./panels/stage-menu.js"),
+    ({ StageMenu }) =>
+      new StageMenu(find, {
+        acts: editor,
+        put: adder.calls("stage"),
+        schema: schema.scene,
+        turning: { page, stage: find("stage"), isNew: () => stream.isNewest(page.painted), push },
+        say,
+      }),
+    { complain },
+  );
+  stage.opens(find("stage-menu"));
+
   const finals = new OnDemand(
     async () => {
       const [module] = await Promise.all([import("./renders/final-pictures.js"), useSheet("renders.css")]);
@@ -129,7 +143,7 @@ export function laterParts({
     { complain, arrived: (made) => page.info && made.show() },
   );
 
-  const all = [comparison, textures, adder, importer, menus, finals, controller.tools];
+  const all = [comparison, textures, adder, importer, menus, stage, finals, controller.tools];
   return {
     comparison,
     textures,

@@ -1,7 +1,8 @@
-"""Built-in scenes, materials and environments: JSON documents, and the assets that our own code makes for them.
+"""Built-in scenes, materials, environments and stages: JSON documents, and assets that our own code makes for them.
 
 A file's `title` is for menus, its `kind` (of a material) for their parts, its `source` says where numbers were
 measured; none of them is part of the document.
+A stage is what things stand on: materials and shapes that it adds to a scene whose thing stands on the origin.
 `"builtin:NAME"` in it stands for an asset of `generated`.
 
 generated      the assets that presets use
@@ -30,7 +31,7 @@ from service.presets.field import sphere_field
 from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
 
-KINDS = ("scenes", "materials", "environments")
+KINDS = ("scenes", "materials", "environments", "stages")
 DEFAULT_SCENE = "shader-ball"
 
 # Documents that would be long files of numbers.

@@ -39,6 +39,9 @@ def among(kind: str, document: dict[str, Any]) -> dict[str, Any]:
     scene = presets.get("scenes", "sphere-on-floor")  # the first scene has a wall before a low sun
     if kind == "materials":
         scene["materials"]["subject"] = document
+    elif kind == "stages":
+        scene["materials"] |= document["materials"]
+        scene["shapes"] += document["shapes"]
     else:
         scene["environment"] = document
     return scene

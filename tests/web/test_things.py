@@ -51,7 +51,7 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
     editor.wait("a picture", lambda: editor.page.get_attribute("#stage", "aria-busy") == "false")
     assert editor.page.locator(".message.refusal").count() == 0
 
-    first, second = (shape["transform"] for shape in document(editor)["shapes"])
+    first, second = (shape["transform"] for shape in document(editor)["shapes"][:2])
     assert first == {"translate": [0.5, 1, 0], "rotate": [0, 70, 90], "scale": [2, 1, 1]}
     assert second["matrix"][3] == -0.8 and second["matrix"][11] == -1
 
@@ -126,11 +126,12 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
         editor.tab("save")
         page.click("#open-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
-    editor.wait("the model alone", lambda: things.count() == 1)
+    editor.wait("the model on a ground, and nothing else", lambda: things.count() == 2)
+    assert document(editor)["shapes"][1]["name"] == "Stage"
     editor.wait("what is said of it", lambda: "sky" in editor.text("#messages"))
     assert "wide" not in editor.text("#messages"), "the picture is as wide as the window in any case"
     with page.expect_file_chooser() as asked:
         editor.tab("save")
         page.click("#add-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
-    editor.wait("another one", lambda: things.count() == 2)
+    editor.wait("another one", lambda: things.count() == 3)

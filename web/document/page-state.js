@@ -22,6 +22,7 @@ export class PageState {
   painted = 0; // the generation on the canvas
   paintedHome = null; // the scene on the canvas, as it was picked
   header = null; // of the frame on the canvas
+  camera = null; // members of the camera that is shown in the place of the scene's, while a turntable turns
   knobs = {}; // what the chosen quality makes of the settings that are not given
 
   // `root` is the element of the picture; `fit(box)` gives the part of a box that one of two pictures has.
@@ -81,7 +82,8 @@ export class PageState {
       quality: PAUSED_QUALITY,
       isExact: compared(this.editor.state) !== null,
     });
-    const { scene, chosen } = this.editor.state;
+    const { scene: own, chosen } = this.editor.state;
+    const scene = this.camera ? { ...own, camera: { ...own.camera, ...this.camera } } : own;
     return { scene: visible(scene, chosen.hidden), settings: this.settings, view };
   }
 
