@@ -93,6 +93,8 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
     try:
         with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
             model = import_model(path, data, store, files_)
+            if model.kind == "materials":
+                raise BadInput(f"{str(path)!r}: holds materials and no shapes; `sunbox import` writes them")
             document = model.scene(presets.default_environment())
             view = None if model.exposure is None else PictureView(exposure=model.exposure)
             aspect = model.aspect_ratio

@@ -1,4 +1,5 @@
-"""`sunbox import MODEL -o SCENE.json`: a model as a document, its meshes and images in files beside it."""
+"""`sunbox import MODEL -o SCENE.json`: a model as a document, its meshes and images in files beside it; likewise the
+materials of a zip or a folder of textures."""
 
 from __future__ import annotations
 
@@ -18,14 +19,16 @@ def run(arguments: argparse.Namespace) -> int:
     source = Path(arguments.model)
     target = files.writable(Path(arguments.output))
     config = configuration()
-    data = files.read(source)
     from service import presets
     from service.assets import AssetStore, FileAssets
-    from service.commands.models import import_model, is_model
+    from service.commands.models import import_model, is_model, zipped_images
     from service.scene import references
 
+    data = zipped_images(source) if source.is_dir() else files.read(source)
     if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
-        raise BadInput(f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip")
+        raise BadInput(
+            f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip, nor a folder of textures"
+        )
     folder = target.with_suffix(".assets")
     with (
         tempfile.TemporaryDirectory(prefix="sunbox-") as scratch,
@@ -34,6 +37,9 @@ def run(arguments: argparse.Namespace) -> int:
         refusals(),
     ):
         model = import_model(source, data, store, beside)
+        document = model.scene(presets.default_environment())
+        if model.kind == "materials":
+            document = {name: document[name] for name in ("materials", "textures")}
         if (aspect := model.aspect_ratio) not in (None, 1):
             size = picture_size(read_settings([], config), aspect)
             told = f"--set width={size['width']} --set height={size['height']}"
@@ -41,7 +47,6 @@ def run(arguments: argparse.Namespace) -> int:
                 f"note: the camera's picture is {aspect:.3g} times as wide as high: {told} renders it",
                 file=sys.stderr,
             )
-        document = model.scene(presets.default_environment())
         builtin = presets.builtin_assets().keys()
         files.make_folder(folder)
 

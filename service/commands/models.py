@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
+from service.assets import formats
 from service.assets.errors import ParseError
 from service.assets.formats import sniff, text
 from service.assets.gltf.document import load
@@ -51,11 +52,24 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) 
         data, title = _zipped(path, data, files), "the OBJ file"
     elif format not in WHOLE:
         data, format = _embedded(data, files), "gltf"
-    imported = store.scene(store.add(data, filename=f"model.{format}", title=title).id)
+    info = store.add(data, filename=f"model.{format}", title=title)
+    imported = store.materials(info.id) if info.kind == "materials" else store.scene(info.id)
     for warning in imported.warnings:
         place = f"{warning['pointer']}: " if warning["pointer"] else ""
         print(f"warning: {place}{warning['detail']}", file=sys.stderr)
     return imported
+
+
+def zipped_images(folder: Path) -> bytes:
+    """The images of a folder as a zip. Raises BadInput where there is none."""
+    from service.assets.obj.importer import zipped
+    from service.commands import files
+
+    endings = tuple(f".{ending}" for ending, format in formats.SUFFIXES.items() if formats.KINDS[format] == "image")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in endings and path.is_file())
+    if not paths:
+        raise BadInput(f"{str(folder)!r}: holds no images ({', '.join(endings)})")
+    return zipped({f"{folder.resolve().name}/{path.name}": files.read(path) for path in paths})
 
 
 def _embedded(data: bytes, files: FileAssets) -> bytes:

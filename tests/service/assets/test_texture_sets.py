@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from service.assets import AssetStore
 from service.assets.texture_sets.names import meaning
+from service.cli import main
 from service.problems import AssetError, NotFound
 from service.scene.saved_material import check_saved_material
 from tests import asset_files as make
@@ -215,3 +218,28 @@ def test_the_materials_are_served_and_a_restart_has_them(server: Server) -> None
     image = found["textures"]["Oak_Color"]["asset"]
     assert server.http.get(f"/v1/assets/{image}/materials").status_code == 404
     assert server.http.get(f"/v1/assets/{answer.json()['id']}/scene").status_code == 404
+
+
+def test_the_command_writes_the_material_of_a_zip_or_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SUNBOX_DATA_DIR", str(tmp_path / "data"))
+    folder, packed = tmp_path / "oak", tmp_path / "oak.zip"
+    folder.mkdir()
+    for name in ("oak_color", "oak_rough", "oak_ao"):
+        (folder / f"{name}.png").write_bytes(make.png(COLOR))
+    (folder / "readme.txt").write_text("CC0")
+    packed.write_bytes(zipped({path.name: path.read_bytes() for path in folder.iterdir()}))
+    for source in (folder, packed):
+        target = tmp_path / f"{source.suffix or 'folder'}.json"
+        assert main(["import", str(source), "-o", str(target)]) == 0
+        assert "oak_ao.png: ambient occlusion is left out" in capsys.readouterr().err
+        document = json.loads(target.read_text())
+        assert document.keys() == {"materials", "textures"}
+        assert document["materials"]["oak"].keys() == {"type", "base_color", "roughness"}
+        for texture in document["textures"].values():
+            assert (tmp_path / texture["asset"]).read_bytes() == make.png(COLOR)
+    assert main(["render", str(packed), "-o", str(tmp_path / "a.png")]) == 2
+    assert "holds materials and no shapes" in capsys.readouterr().err
+    (empty := tmp_path / "empty").mkdir()
+    assert main(["import", str(empty), "-o", str(tmp_path / "e.json")]) == 2
