@@ -43,6 +43,7 @@ class AsyncStream:
         self._unseen: list[dict[str, Any]] = []  # updates that the server may not have taken yet, in order
         self._unacknowledged: int | None = None
         self._attempt = 0
+        self._mending = asyncio.Lock()  # an update may be sent while a frame is waited for: one of them reconnects
         self._samples = -1  # of the last frame as it is to look now
         self.generation = 0
         self.done: dict[str, Any] | None = None
@@ -141,10 +142,11 @@ class AsyncStream:
     async def _send(self, message: dict[str, Any]) -> None:
         if self._socket is None:
             raise RuntimeError("a stream is used as a context manager: `with client.stream(scene) as stream:`")
+        socket = self._socket
         try:
-            await self._socket.send(files.text(message))
+            await socket.send(files.text(message))
         except ConnectionClosed as error:
-            await self._taken_up(error)
+            await self._taken_up(error, socket)
             if message["type"] in ("view", "pause", "resume"):  # updates were sent again, and frames are counted anew
                 await self._send(message)
 
@@ -152,16 +154,19 @@ class AsyncStream:
         if self._socket is None:
             raise RuntimeError("a stream is used as a context manager: `with client.stream(scene) as stream:`")
         while True:
+            socket = self._socket
             try:
-                message = await self._socket.recv()
+                message = await socket.recv()
                 self._attempt = 0
                 return message
             except ConnectionClosed as error:
-                await self._taken_up(error)
+                await self._taken_up(error, socket)
 
-    async def _taken_up(self, error: ConnectionClosed) -> None:
-        await self._again(error)
-        await self._connect()
+    async def _taken_up(self, error: ConnectionClosed, broken: ClientConnection) -> None:
+        async with self._mending:
+            if self._socket is broken:
+                await self._again(error)
+                await self._connect()
 
     async def _again(self, error: Exception) -> None:
         """Returns when it is time to try again. Raises SunboxError where that would change nothing."""
