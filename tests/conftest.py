@@ -43,11 +43,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    if importlib.util.find_spec("ray") is None and not os.environ.get("CI"):
-        no_ray = pytest.mark.skip(reason="Ray is not installed: .venv/bin/pip install -r requirements.ray.lock")
-        for item in items:
-            if item.get_closest_marker("ray") is not None:
-                item.add_marker(no_ray)
+    for marker, package in (("ray", "ray"), ("notebook", "jupyterlab")):
+        if importlib.util.find_spec(package) is None and not os.environ.get("CI"):
+            reason = f"{package} is not installed: .venv/bin/pip install -r requirements.{marker}.lock"
+            for item in items:
+                if item.get_closest_marker(marker) is not None:
+                    item.add_marker(pytest.mark.skip(reason=reason))
     ranks = {TESTS / name: rank for rank, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: ranks.get(item.path, len(ranks)))
 

@@ -106,6 +106,16 @@ def test_the_proxy_of_compose_is_trusted() -> None:
         assert config.max_connections > Config.model_fields["max_connections"].default
 
 
+def test_the_notebook_is_tested_with_what_is_locked() -> None:
+    """CI installs this lock, too, into the same environment."""
+    everything, notebook = (
+        dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
+        for name in ("requirements.lock", "requirements.notebook.lock")
+    )
+    assert {"anywidget", "jupyterlab"} <= notebook.keys() and "jupyterlab" not in everything
+    assert {name: everything.get(name, pin) for name, pin in notebook.items()} == notebook
+
+
 def test_the_image_with_ray_has_what_was_tested() -> None:
     """CI installs both locks into one environment."""
     pins = [

@@ -110,7 +110,7 @@ ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
 
 # The rooms of the editor, from the bottom to the top; "" is web/ itself.
-WEB_ROOMS = "lib; server; document lobe; forms picture; panels renders; compare"
+WEB_ROOMS = "lib; server; document lobe; forms picture; panels renders; compare widget"
 WEB_LAYERS = [*({*rooms.split()} for rooms in WEB_ROOMS.split(";")), {""}]
 SPECIFIER = re.compile(r"""(?:\bfrom\s+|\bimport\s*\(\s*|\bimport\s+)["'](\.{1,2}/[^"']+)["']""")
 

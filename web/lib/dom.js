@@ -2,6 +2,10 @@
 
 let counter = 0;
 export const freshId = (stem) => `${stem}-${++counter}`;
+// Where a page holds several copies of this module, each begins elsewhere.
+export const beginIds = (at) => {
+  counter = at;
+};
 
 // An element with attributes (`class`, `aria-label`, ...; true and false switch one on and off),
 // listeners (`onclick`, ...) and children.

@@ -12,6 +12,8 @@ frames           a frame of a stream
 lobes            what a BSDF answers, as arrays
 merge            merge patches (RFC 7386)
 progress         a line while a render goes on
+view             View: a live picture in a notebook
+live             a stream that is edited, and watched no faster than somebody looks
 background       an event loop in a thread of its own
 document         the scene's document as types, generated from a server's schema
 mcp              `sunbox-mcp`: tools for agents, by the Model Context Protocol
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from sunbox.frames import Frame
     from sunbox.lobes import Albedo, Bsdf, SpecularLobe
     from sunbox.local import render
+    from sunbox.view import View
 
 _PLACES = {
     "async_batch": ("AsyncBatch",),
@@ -50,6 +53,7 @@ _PLACES = {
     "frames": ("Frame",),
     "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
     "local": ("render",),
+    "view": ("View",),
 }
 _MODULE = {name: module for module, names in _PLACES.items() for name in names}
 
@@ -73,6 +77,7 @@ __all__ = [
     "Stream",
     "SunboxError",
     "Unreachable",
+    "View",
     "render",
 ]
 

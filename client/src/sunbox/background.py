@@ -34,6 +34,10 @@ class Background:
                 asyncio.run_coroutine_threadsafe(_others_ended(), self._started()).result()
             raise
 
+    def post(self, work: Coroutine[Any, Any, Any]) -> None:
+        """Begins `work`, and does not wait for it."""
+        asyncio.run_coroutine_threadsafe(work, self._started())
+
     def close(self) -> None:
         """Ends the loop; it may be started again."""
         with self._lock:

@@ -20,7 +20,8 @@ from sunbox.frames import Frame
 from sunbox.lobes import Albedo, Bsdf
 
 T = TypeVar("T")
-run = Background().run  # of all clients: one loop, one thread
+_background = Background()  # of all clients: one loop, one thread
+run, post = _background.run, _background.post
 
 
 class Client:

@@ -20,6 +20,21 @@ def merged(target: Any, patch: Any) -> Any:
     return result
 
 
+def difference(old: Any, new: Any) -> Any:
+    """The patch that leads from one document to another; None where they are equal. Neither holds a null."""
+    if old == new:
+        return None
+    if not isinstance(old, dict) or not isinstance(new, dict) or ("type" in new and _changes_type(old, new)):
+        return new
+    patch: dict[str, Any] = {name: None for name in old if name not in new}
+    for name, value in new.items():
+        if name not in old:
+            patch[name] = value
+        elif (change := difference(old[name], value)) is not None:
+            patch[name] = change
+    return patch
+
+
 def _changes_type(target: dict[str, Any], patch: dict[str, Any]) -> bool:
     """Only texts and absence count: in a table of materials, "type" may be somebody's material."""
     old, new = target.get("type"), patch.get("type")

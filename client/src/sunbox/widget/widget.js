@@ -1,0 +1,1486 @@
+// Written by client/bundle.py from web/widget/ and what it imports.
+const lib_dom = (() => {
+let counter=0;
+const freshId = (stem) => `${stem}-${++counter}`;
+const beginIds=(at)=>{
+counter=at;
+};
+function element(tag,attributes={},...children){
+const node=document.createElement(tag);
+for(const [name,value] of Object.entries(attributes)){
+if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
+else if (typeof value === "boolean") node.toggleAttribute(name, value);
+else if(value !==undefined)node.setAttribute(name,value);
+}
+node.append(...children.filter((child)=>child !==null&&child !==undefined));
+return node;
+}
+const isBeingEdited = (input) => document.activeElement === input && input.dataset.dirty === "yes";
+return { beginIds, element, freshId, isBeingEdited };
+})();
+const lib_format_text = (() => {
+const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
+const NAMES={
+aces: "ACES",
+agx: "AgX",
+pbr_neutral: "PBR neutral",
+mis: "MIS",
+bsdf: "BSDF",
+blackman_harris: "Blackman\u2013Harris",
+ggx: "GGX",
+gtr: "GTR",
+abc: "ABC",
+sgd: "SGD",
+eon: "EON",
+oren_nayar: "Oren\u2013Nayar",
+cook_torrance: "Cook\u2013Torrance",
+schlick_ggx: "Schlick\u2013GGX",
+color: "Colour",
+shape_id: "Shapes",
+material_id: "Materials",
+};
+const unitText=(unit)=>UNITS[unit] ?? unit;
+function inWords(name){
+const spaced = name.replaceAll(/[_-]/g, " ");
+return NAMES[name] ?? spaced.charAt(0).toUpperCase()+ spaced.slice(1);
+}
+const compact=(value)=>
+[value]
+.flat()
+.map((each)=>String(Number(each.toPrecision(4))))
+.join(", ");
+const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0%`;
+const amount = (n, thing) => `${count(n)} ${thing}${n === 1 ? "" : "s"}`;
+const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+return { amount, compact, count, inWords, percent, unitText };
+})();
+const lib_patch = (() => {
+const isObject = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+function equal(a,b){
+if(a===b)return true;
+if (a === null || b === null || typeof a !== "object" || typeof b !== "object") return false;
+if(Array.isArray(a)!==Array.isArray(b))return false;
+const keys=Object.keys(a);
+return keys.length===Object.keys(b).length&&keys.every((key)=>key in b&&equal(a[key],b[key]));
+}
+const changesType=(from,to)=>
+from.type !== to.type && [from.type, to.type].every((kind) => kind === undefined || typeof kind === "string");
+function diff(from,to){
+if(from===to)return undefined;
+if(!isObject(from)||!isObject(to)||changesType(from,to))return equal(from,to)? undefined:to;
+const patch={};
+for(const key of Object.keys(from))if(to[key]===undefined)patch[key]=null;
+for(const [key,value] of Object.entries(to)){
+const change=value===undefined ? undefined:diff(from[key],value);
+if(change !==undefined)patch[key]=change;
+}
+return Object.keys(patch).length ? patch:undefined;
+}
+const parts=(pointer)=>
+pointer
+.split("/")
+.slice(1)
+.map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
+const pointer=(...keys)=>
+keys.map((key) => `/${String(key).replaceAll("~", "~0").replaceAll("/", "~1")}`).join("");
+function put(document,place,value){
+const set=(node,[key,...rest])=>{
+if(key===undefined)return value;
+const copy=Array.isArray(node)? [...node]:{...node};
+const child=set(copy[key],rest);
+if(child===undefined&&!Array.isArray(copy))delete copy[key];
+else copy[key]=child;
+return copy;
+};
+return set(document,parts(place));
+}
+return { diff, equal, isObject, pointer, put };
+})();
+const server_schema = (() => {
+function resolve(schema,node){
+if(!node?.$ref)return node ??{};
+const target=node.$ref
+.split("/")
+.slice(1)
+.reduce((place,key)=>place[key],schema);
+const{$ref,...beside}=node;
+return{...resolve(schema,target),...beside};
+}
+const branches=(schema,node)=>{
+const options=node.anyOf ?? node.oneOf;
+return options
+? options.map((option) => resolve(schema, option)).filter((option) => option.type !== "null")
+:[node];
+};
+function property(schema,model,name){
+return resolve(schema,resolve(schema,model).properties[name]);
+}
+function variants(schema,union){
+const found={};
+const visit=(node)=>{
+const kind=node.properties?.type;
+if(kind)found[kind.const ?? kind.enum?.[0] ?? kind.default]=node;
+else if(node.anyOf||node.oneOf)branches(schema,node).forEach(visit);
+};
+visit(resolve(schema,union));
+return found;
+}
+const model=(schema,owner,name)=>
+branches(schema,property(schema,owner,name)).find((node)=>node.properties);
+const materialModels=(schema)=>
+variants(schema, property(schema, schema, "materials").additionalProperties);
+const bound=(nodes,key)=>nodes.map((node)=>node[key]).find((value)=>value !==undefined);
+function step(min,max,whole){
+if(whole)return 1;
+return Number.isFinite(max - min) ? 10 ** Math.ceil(Math.log10((max - min) / 500)) : 0.01;
+}
+function field(schema,name,raw,required){
+const top=resolve(schema,raw);
+const options=branches(schema,top);
+const nodes=[top,...options];
+const color = bound(nodes, "x-widget") === "color";
+const numeric = options.find((node) => ["number", "integer"].includes(node.type));
+const vector=
+!color&&
+options.find((node) => node.type === "array" && [2, 3].includes(node.maxItems) && node.items?.type === "number");
+const reference=options.find((node)=>node.properties?.texture);
+const whole = !options.some((node) => node.type === "number");
+const limits=[top,...(numeric ? [numeric]:[])];
+const choices = bound(nodes, "enum");
+const open = { min: bound(limits, "exclusiveMinimum"), max: bound(limits, "exclusiveMaximum") };
+const min = bound(limits, "minimum") ?? open.min;
+const max = bound(limits, "maximum") ?? open.max;
+const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
+const widget=color
+? "color"
+:vector
+? "vector"
+:choices
+? "choice"
+: options.some((node) => node.type === "boolean")
+? "toggle"
+:numeric
+? (bound(nodes, "x-widget") ?? "number")
+:reference
+? "texture"
+:null;
+if (!widget || bound(nodes, "const") !== undefined) return null;
+return{
+name,
+widget,
+choices,
+min,
+max,
+open,
+required,
+takesTexture:reference !==undefined,
+reference,
+length:vector?.maxItems,
+title:top.title ?? name,
+group: bound(nodes, "x-group"),
+hint: bound(nodes, "description") ?? "",
+unit: bound(nodes, "x-unit") ?? "",
+soft,
+step:step(soft.min,soft.max,whole&&!color),
+whole,
+initial:top.default ?? undefined,
+absent: bound(nodes, "x-absent"),
+follows: bound(nodes, "x-follows"),
+ranges: bound(nodes, "x-ranges"),
+used: bound(nodes, "x-used"),
+example: bound(nodes, "examples")?.[0],
+isPerChannel: Boolean(vector && numeric && bound(nodes, "x-group")),
+};
+}
+function fields(schema,owner){
+const{properties={},required=[]}=resolve(schema,owner);
+return Object.entries(properties)
+.map(([name,raw])=>field(schema,name,raw,required.includes(name)))
+.filter((found)=>found !==null);
+}
+function followed({follows},value){
+if (!follows || typeof value !== "number") return undefined;
+const{points}=follows;
+const to=Math.max(
+1,
+points.findIndex(([x])=>x>=value),
+);
+const [[x0,y0],[x1,y1]]=[points[to - 1],points[to]];
+return Number((y0 + ((y1 - y0) * (value - x0)) / (x1 - x0)).toPrecision(3));
+}
+function defaults(schema,owner,names=Object.keys(owner.properties)){
+const known=names.map((name)=>[name,property(schema,owner,name).default]);
+return Object.fromEntries(known.filter(([,value])=>value !==undefined&&value !==null));
+}
+return { defaults, fields, followed, materialModels, model, property, variants };
+})();
+const lib_color = (() => {
+const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+const toLinear = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
+const HEX = /^#?([0-9a-f]{6})$/i;
+function linear(color){
+if (typeof color === "number") return [color, color, color];
+if (typeof color !== "string") return color;
+const bits=parseInt(HEX.exec(color)[1],16);
+return [bits >> 16, (bits >> 8) & 255, bits & 255].map((byte) => toLinear(byte / 255));
+}
+function parseColor(text){
+const plain=text.trim();
+const wanted = /^([0-9a-f]{3}|[0-9a-f]{6})$/i.test(plain) ? `#${plain}` : plain;
+const context = new OffscreenCanvas(1, 1).getContext("2d");
+const [found, other] = ["#000000", "#ffffff"].map((before) => {
+context.fillStyle=before;
+context.fillStyle=wanted;
+return context.fillStyle;
+});
+return found===other&&HEX.test(found)? linear(found):null;
+}
+const hex=(color)=>
+"#" +
+color
+.map((x)=>
+Math.round(255 * toSrgb(Math.min(Math.max(x,0),1)))
+.toString(16)
+.padStart(2, "0"),
+)
+.join("");
+return { HEX, hex, linear, parseColor, toLinear, toSrgb };
+})();
+const lib_sliding = (() => {
+const STILL=6;
+const GLIDE_MS=100;
+let scrolled=-Infinity;
+document.addEventListener(
+"scroll",
+()=>{
+scrolled=performance.now();
+},
+{capture:true,passive:true},
+);
+function slideByTouch(range,{input,commit}){
+let finger=null;
+const set=(from,pixels)=>{
+const [min,max]=[Number(range.min),Number(range.max)];
+range.value = String(from + (pixels / range.clientWidth) * (max - min));
+input(range.valueAsNumber);
+};
+range.addEventListener(
+"input",
+(event)=>{
+if(!finger)return;
+event.stopImmediatePropagation();
+range.value=String(finger.value);
+},
+{capture:true},
+);
+range.addEventListener("pointerdown", ({ pointerType, pointerId: id, clientX: x, clientY: y }) => {
+if (pointerType !== "touch" || finger) return;
+const value=range.valueAsNumber;
+finger={id,x,y,from:value,value,isSliding:false,isTap:performance.now()- scrolled>GLIDE_MS};
+});
+range.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
+if(pointerId !==finger?.id)return;
+const [right,down]=[Math.abs(clientX - finger.x),Math.abs(clientY - finger.y)];
+if(right>STILL||down>STILL)finger.isTap=false;
+if(!finger.isSliding&&right>STILL&&right>down)Object.assign(finger,{isSliding:true,x:clientX});
+if(!finger.isSliding)return;
+set(finger.from,clientX - finger.x);
+finger.value=range.valueAsNumber;
+});
+const lift=({pointerId,type})=>{
+if(pointerId !==finger?.id)return;
+const{x,isSliding,isTap}=finger;
+finger=null;
+const isTapped = isTap && type === "pointerup";
+if(isTapped)set(Number(range.min),x - range.getBoundingClientRect().left);
+if(isTapped||isSliding)commit();
+};
+range.addEventListener("pointerup", lift);
+range.addEventListener("pointercancel", lift);
+}
+return { slideByTouch };
+})();
+const lib_number = (() => {
+const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?:\s*([^\s\d.+*/()-]+))?|([-+*/()]))/giy;
+const UNITS={
+m:{km:1000,cm:0.01,mm:0.001,µm:1e-6,nm:1e-9,in:0.0254,ft:0.3048},
+"°": { deg: 1, rad: 180 / Math.PI },
+s:{ms:0.001,min:60,h:3600},
+pixels:{px:1},
+};
+function tokens(text,unit){
+const factors = { ...UNITS[unit], ...(unit ? { [unit]: 1 } : { "%": 0.01 }) };
+const found=[];
+TOKEN.lastIndex=0;
+while(TOKEN.lastIndex<text.length){
+const match=TOKEN.exec(text);
+if(!match)return null;
+const [,digits,own,sign]=match;
+if(own&&!Object.hasOwn(factors,own))return null;
+found.push(sign ?? Number(digits)*(own ? factors[own]:1));
+}
+return found;
+}
+function calculate(rest){
+const factor=()=>{
+const next=rest.shift();
+if (next === "-") return -factor();
+if (next === "+") return factor();
+if (next !== "(") return typeof next === "number" ? next : NaN;
+const inside=sum();
+return rest.shift() === ")" ? inside : NaN;
+};
+const product=()=>{
+let value=factor();
+while (rest[0] === "*" || rest[0] === "/") value = rest.shift() === "*" ? value * factor() : value / factor();
+return value;
+};
+const sum=()=>{
+let value=product();
+while (rest[0] === "+" || rest[0] === "-") value = rest.shift() === "+" ? value + product() : value - product();
+return value;
+};
+const value=sum();
+return rest.length ? NaN:value;
+}
+function parseNumber(text, unit = "") {
+let plain = text.trim().replaceAll("\u2212", "-");
+if(unit&&!UNITS[unit]&&plain.endsWith(unit))plain=plain.slice(0,-unit.length).trimEnd();
+if (plain.includes(",") && plain.includes(".")) return null;
+const found = tokens(plain.replaceAll(",", ".").replaceAll(/(?<=\d)[\s\u202f](?=\d{3}(?!\d))/g, ""), unit);
+const value=found?.length ? calculate(found):NaN;
+return Number.isFinite(value)? Number(value.toPrecision(12)):null;
+}
+function parseTriple(text){
+const apart = text.trim().split(/[\s;]+/);
+const parts = apart.length === 1 ? apart[0].split(",") : apart.map((part) => part.replace(/,$/, ""));
+const numbers=parts.map((part)=>parseNumber(part));
+return numbers.length===3&&numbers.every((number)=>number !==null)? numbers:null;
+}
+const NEEDED = "A number is needed here, such as 0.5, 0,5, 1/3 or 50%.";
+const neededIn = (unit) => (unit ? `A number is needed here, in ${unit}, such as 0.5, 0,5 or 1/3.` : NEEDED);
+return { NEEDED, neededIn, parseNumber, parseTriple };
+})();
+const lib_scrub = (() => {
+const STILL=3;
+const PACE=2;
+function scrubBy(label,{begin,move,end,cancel}){
+let hand=null;
+const finish=(how)=>{
+const was=hand;
+hand=null;
+document.removeEventListener("keydown", escape, true);
+if(!was?.isScrubbing)return;
+const swallow=(event)=>event.preventDefault();
+label.addEventListener("click", swallow);
+setTimeout(() => label.removeEventListener("click", swallow));
+how();
+};
+const escape=(event)=>{
+if (event.key !== "Escape") return;
+event.stopPropagation();
+finish(cancel);
+};
+label.classList.add("scrubs");
+label.addEventListener("pointerdown", ({ button, pointerId: id, clientX: x }) => {
+if(button !==0||hand)return;
+hand={id,x,steps:0,isScrubbing:false};
+label.setPointerCapture(id);
+});
+label.addEventListener("pointermove", ({ pointerId, clientX, shiftKey }) => {
+if(pointerId !==hand?.id)return;
+if(!hand.isScrubbing){
+if(Math.abs(clientX - hand.x)<STILL)return;
+hand.isScrubbing=true;
+document.addEventListener("keydown", escape, true);
+begin();
+}
+const steps = Math.trunc((clientX - hand.x) / PACE);
+if(!steps)return;
+hand.x +=steps * PACE;
+hand.steps +=steps *(shiftKey ? 10:1);
+move(hand.steps);
+});
+for (const type of ["pointerup", "pointercancel"])
+label.addEventListener(type,({pointerId})=>{
+if(pointerId===hand?.id)finish(end);
+});
+return label;
+}
+return { scrubBy };
+})();
+const lib_span = (() => {
+const FAR=90;
+const STEPS=1000;
+const DIGITS=3;
+function span({min,max},step,mayBeLog){
+const isLog=mayBeLog&&(min>0 ? max>FAR * min:min===0&&max>FAR);
+if(!isLog)return{min,max,isLog,step,stepAt:()=>step};
+const [low, range] = min > 0 ? [Math.log(min), Math.log(max / min)] : [0, Math.log1p(max)];
+const inside=(value)=>Math.min(Math.max(value,min),max);
+return{
+min,
+max,
+isLog,
+step: 1 / STEPS,
+toShare: (value) => ((min > 0 ? Math.log(inside(value)) : Math.log1p(inside(value))) - low) / range,
+fromShare:(share)=>
+inside(Number((min>0 ? Math.exp(low + share * range):Math.expm1(share * range)).toPrecision(DIGITS))),
+stepAt:(value)=>10 **(Math.floor(Math.log10(Math.max(Math.abs(value),min,1e-3))+ 1e-9)- 1),
+};
+}
+function endsOf({ranges,soft},choice){
+const own=ranges?.bounds[choice];
+return own ?{min:own[0],max:own[1]}:soft;
+}
+return { endsOf, span };
+})();
+const forms_controls = (() => {
+const { hex, linear, parseColor } = lib_color;
+const { element, isBeingEdited } = lib_dom;
+const { slideByTouch } = lib_sliding;
+const { neededIn, parseNumber, parseTriple } = lib_number;
+const { compact, inWords, unitText } = lib_format_text;
+const { scrubBy } = lib_scrub;
+const { span } = lib_span;
+const STOPS=8;
+const exact=(x)=>Number(x.toPrecision(5));
+const UNSET = "–";
+function numberEntry(field,id,{input,commit,refuse,restore}){
+const unit=unitText(field.unit);
+let latest=null;
+let scale=span(field.soft,field.step,Boolean(field.ranges));
+const clean=()=>{
+delete box.dataset.dirty;
+};
+const take=()=>{
+clean();
+if (box.value.trim() === "") {
+if(field.required)return restore();
+input(undefined);
+return commit();
+}
+const value=parseNumber(box.value,unit);
+if(value===null)return refuse(neededIn(unit));
+input(value);
+commit();
+};
+const now=()=>
+parseNumber(box.value,unit)?? latest ?? parseNumber(box.placeholder)?? field.initial ?? field.soft.min ?? 0;
+const{min=-Infinity,max=Infinity,open}=field;
+const give=(value)=>{
+const to=Number(value.toPrecision(12));
+if(to<min||to>max||to<=open.min||to>=open.max)return;
+clean();
+input(to);
+box.value=compact(to);
+};
+const step=(steps)=>{
+const from=now();
+give(from + steps * scale.stepAt(from));
+box.select();
+};
+let begun=null;
+const drag={
+begin:()=>{
+begun={latest,from:latest ?? now()};
+},
+move:(steps)=>give(Math.min(Math.max(begun.from + steps * scale.stepAt(begun.from),min),max)),
+end:commit,
+cancel:()=>{
+input(begun.latest ?? undefined);
+commit();
+},
+};
+const box = element("input", {
+type: "text",
+id,
+class: "entry number",
+autocomplete: "off",
+spellcheck: "false",
+inputmode: field.min >= 0 ? "decimal" : undefined,
+oninput:()=>{
+box.dataset.dirty = "yes";
+},
+onblur:clean,
+onkeydown:(event)=>{
+if (event.key === "Escape") {
+clean();
+restore();
+}
+const up={ArrowUp:1,ArrowDown:-1}[event.key];
+if(!up||event.altKey||event.ctrlKey||event.metaKey)return;
+event.preventDefault();
+step(up *(event.shiftKey ? 10:1));
+},
+onkeyup:({key})=>{
+if (key === "ArrowUp" || key === "ArrowDown") commit();
+},
+onchange:take,
+});
+const show=(value,effective,ends=field.soft)=>{
+latest=value ?? null;
+scale=span(ends,field.step,Boolean(field.ranges));
+box.placeholder=effective===undefined ?(field.absent ?? UNSET):compact(effective);
+const holds=latest ?? effective;
+if (typeof holds === "number") {
+box.setAttribute("role", "spinbutton");
+box.setAttribute("aria-valuenow", String(holds));
+} else ["role", "aria-valuenow"].forEach((name) => box.removeAttribute(name));
+if(isBeingEdited(box))return;
+box.value = latest === null ? "" : compact(latest);
+box.title = latest === null || box.value === String(latest) ? "" : String(latest);
+};
+return{element:box,show,drag};
+}
+function track(field,id,{input,commit}){
+let scale=null;
+const inside=(at)=>{
+const value=scale.isLog ? scale.fromShare(at):at;
+if(value<=field.open.min)return field.open.min + field.step;
+return value>=field.open.max ? field.open.max - field.step:value;
+};
+const range = element("input", {
+type: "range",
+id,
+oninput:()=>input(inside(range.valueAsNumber)),
+onchange:commit,
+});
+const over=(ends)=>{
+if(scale&&ends.min===scale.min&&ends.max===scale.max)return;
+scale=span(ends,field.step,Boolean(field.ranges));
+const [min,max]=scale.isLog ? [0,1]:[ends.min,ends.max];
+Object.assign(range,{min:String(min),max:String(max),step:String(scale.step)});
+};
+over(field.soft);
+slideByTouch(range,{input:(value)=>input(inside(value)),commit});
+const show=(value,effective,ends=field.soft)=>{
+over(ends);
+const [min,max]=[Number(range.min),Number(range.max)];
+const known=value ?? effective ?? null;
+range.classList.toggle("ghost", (value ?? null) === null);
+range.classList.toggle("unset", known === null);
+range.value=String(known===null ? min:scale.isLog ? scale.toShare(known):known);
+range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
+const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
+const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
+range.setAttribute("aria-valuetext", words);
+};
+return{element:range,show};
+}
+function slider(field,id,events){
+const range=track(field,id,events);
+const entry = numberEntry(field, `${id}-entry`, events);
+entry.element.setAttribute("aria-label", `${field.title}, number`);
+return{
+element: element("div", { class: "slider" }, range.element, entry.element),
+drag:entry.drag,
+show(value,effective,ends){
+range.show(value,effective,ends);
+entry.show(value,effective,ends);
+},
+};
+}
+function choice(field,id,{input,commit}){
+const select = element("select", {
+id,
+onchange:()=>{
+input(select.value||undefined);
+commit();
+},
+});
+if (field.initial === undefined && !field.required) select.append(element("option", { value: "" }, "Automatic"));
+for(const name of field.choices.filter((option)=>option !==null)){
+select.append(element("option", { value: name }, inWords(name)));
+}
+return{
+element:select,
+show:(value)=>{
+select.value = value ?? "";
+},
+};
+}
+function toggle(field,id,{input,commit}){
+const box = element("input", {
+type: "checkbox",
+id,
+class: "toggle",
+onchange:()=>{
+input(box.checked);
+commit();
+},
+});
+const show=(value)=>{
+Object.assign(box,{checked:Boolean(value),indeterminate:(value ?? null)===null});
+};
+return{element:box,show};
+}
+function vector(field,id,{input,commit,refuse,restore}){
+const names = field.length === 2 ? ["U", "V"] : field.isPerChannel ? ["red", "green", "blue"] : ["X", "Y", "Z"];
+let latest=null;
+const entries=names.map((axis,i)=>{
+const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
+input:(value)=>input(latest ? latest.map((x,k)=>(k===i ? value:x)):names.map(()=>value)),
+commit,
+refuse,
+restore,
+});
+entry.element.setAttribute("aria-label", `${field.title}, ${axis}`);
+return entry;
+});
+return{
+element:element(
+"div",
+{ class: "vector" },
+...entries.map((entry,i)=>
+element(
+"span",
+{ class: "axis", "data-axis": names[i] },
+scrubBy(element("i", { "aria-hidden": "true" }, names[i].charAt(0).toUpperCase()), entry.drag),
+entry.element,
+),
+),
+),
+show(value){
+const known=value ??(field.isPerChannel ? null:0);
+latest=Array.isArray(known)||known===null ? known:names.map(()=>known);
+entries.forEach((entry,i)=>entry.show(latest?.[i]));
+},
+};
+}
+function strengthControl(field,id,events){
+const named=(title,more)=>({...field,title,ranges:true,initial:undefined,...more});
+const title = `${field.title}, strength`;
+const ends={min:2 ** -STOPS,max:2 ** STOPS};
+const range = track(named(title, { soft: ends }), `${id}-strength`, events);
+const stops=numberEntry(
+named(title, { unit: "", min: undefined, max: undefined, open: {}, soft: {}, ranges: undefined, step: 0.1 }),
+`${id}-stops`,
+{...events,input:(value)=>events.input(value===undefined ? undefined:exact(2 ** value))},
+);
+const entry = numberEntry(named(title, {}), `${id}-strength-entry`, events);
+range.element.setAttribute("aria-label", title);
+stops.element.setAttribute("aria-label", `${title} in stops`);
+entry.element.setAttribute("aria-label", `${title}, number`);
+return{
+element:element(
+"div",
+{ class: "slider strength" },
+range.element,
+element("span", { class: "stops" }, stops.element, element("i", { "aria-hidden": "true" }, "stops")),
+entry.element,
+),
+show(value){
+if(value>0){
+ends.min=Math.min(ends.min,2 **(Math.floor(Math.log2(value))- 2));
+ends.max=Math.max(ends.max,2 **(Math.ceil(Math.log2(value))+ 2));
+}
+range.show(value,undefined,{...ends});
+stops.show(value>0 ? Number(Math.log2(value).toFixed(2)):null);
+entry.show(value);
+const told = value > 0 ? `${Number(Math.log2(value).toFixed(1))} stops, ` : "";
+range.element.setAttribute("aria-valuetext", `${told}${compact(value)} ${unitText(field.unit)}`.trim());
+},
+};
+}
+function color(field,id,{input,commit,refuse,restore}){
+const bright=!(field.max<=1);
+let strength=1;
+let tint=[1,1,1];
+let isLinear=false;
+const give=()=>input(tint.map((x)=>Number((x * strength).toPrecision(5))));
+const swatch = element("input", {
+type: "color",
+id,
+onchange:commit,
+oninput:()=>{
+tint=linear(swatch.value);
+if(bright&&strength===0)strength=1;
+give();
+},
+});
+const text = element("input", {
+type: "text",
+class: "entry",
+spellcheck: "false",
+autocomplete: "off",
+"aria-label": `${field.title}, #rrggbb or three linear numbers`,
+placeholder:field.absent ?? UNSET,
+oninput:()=>{
+text.dataset.dirty = "yes";
+},
+onblur:()=>{
+delete text.dataset.dirty;
+},
+onkeydown:(event)=>{
+if (event.key !== "Escape") return;
+delete text.dataset.dirty;
+restore();
+},
+onchange:()=>{
+delete text.dataset.dirty;
+if (text.value === "" && !isSet) return restore();
+const known=parseColor(text.value);
+const triple=parseTriple(text.value);
+if(known)input(known.map((x)=>Number((x *(bright ? strength||1:1)).toPrecision(5))));
+else if(triple)input(triple);
+else return refuse("Write #rrggbb, rgb(), hsl(), or three linear numbers such as 0.2 0.4 0.6.");
+commit();
+},
+});
+const mode = element("button", {
+type: "button",
+class: "mode",
+"aria-label": `${field.title}: linear numbers`,
+"aria-pressed": "false",
+onclick:()=>{
+isLinear=!isLinear;
+mode.setAttribute("aria-pressed", String(isLinear));
+write();
+},
+});
+let isSet=true;
+const write=()=>{
+const shown = !isSet ? "" : isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+if(!isBeingEdited(text))text.value=shown;
+mode.textContent = isLinear ? "lin" : "hex";
+};
+const row = element("div", { class: "color" }, swatch, text, mode);
+const power=
+bright&&
+strengthControl(field,id,{
+input:(value)=>{
+strength=value ?? 0;
+give();
+},
+commit,
+refuse,
+restore,
+});
+return{
+element: power ? element("div", {}, row, power.element) : row,
+show(value){
+isSet=(value ?? null)!==null;
+swatch.classList.toggle("unset", !isSet);
+const now=linear(value ?? 0);
+const most=Math.max(...now);
+if(bright){
+strength=most;
+if (most > 0) tint = now.map((x) => x / most);
+power.show(strength);
+}else tint=now;
+swatch.value=hex(tint);
+write();
+},
+};
+}
+const bounded=({soft})=>Number.isFinite(soft.max - soft.min);
+function control(field,id,events){
+if (field.widget === "color") return color(field, id, events);
+if (field.widget === "strength") return strengthControl(field, id, events);
+if (field.widget === "vector") return vector(field, id, events);
+if (field.widget === "texture") return { element: element("span", { id }), show() {} };
+if (field.widget === "choice") return choice(field, id, events);
+if (field.widget === "toggle") return toggle(field, id, events);
+if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
+return slider(field,id,events);
+}
+return { control };
+})();
+const forms_folds = (() => {
+const { hex, linear } = lib_color;
+const { element } = lib_dom;
+const { compact, inWords } = lib_format_text;
+const { isObject } = lib_patch;
+const ORDER = ["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface", "Film", "Emission", "Geometry"];
+const MOST_WORDS=3;
+const byHand=new Map();
+const place=(group)=>(ORDER.indexOf(group)+ 1||ORDER.length + 1)- 1;
+function words({title,widget},value,group){
+const short = title.replace(new RegExp(`^(${group}|clearcoat) `, "i"), "").toLowerCase();
+if (value?.texture !== undefined) return `${short} ${value.texture}`;
+if(isObject(value))return short;
+if (widget === "color") return `${short} ${hex(linear(value))}`;
+if (typeof value === "boolean") return value ? short : `no ${short}`;
+return `${short} ${typeof value === "string" ? inWords(value).toLowerCase() : compact(value)}`;
+}
+function folds(rows,fields){
+const groups=[...new Set(fields.map(({group})=>group))].sort((a,b)=>place(a)- place(b));
+let isMade=false;
+let query = "";
+const parts=groups.map((group,i)=>{
+const own=fields.filter((field)=>field.group===group);
+const elements=own.map(({name})=>rows.get(name).element);
+const told = element("span", { class: "told" });
+const body = element("div", { class: "form" }, ...elements);
+if(i===0)
+return{
+group,
+own,
+told,
+node:element(
+"section",
+{ class: "fold", role: "group", "aria-label": group },
+element("h3", {}, group),
+body,
+),
+};
+const head = element("summary", {}, element("h3", {}, group), told);
+const node = element("details", { class: "fold", "aria-label": group }, head, body);
+head.addEventListener("click", () => {
+if(!query)byHand.set(group,!node.open);
+});
+return{group,own,told,node};
+});
+const sift=()=>{
+for(const{group,own,node}of parts){
+const isFound = ({ title, hint, name }) => `${group} ${title} ${name} ${hint}`.toLowerCase().includes(query);
+const found=own.filter(isFound);
+for(const{name}of own)
+rows.get(name).element.classList.toggle("sifted", Boolean(query) && !found.some((f) => f.name === name));
+node.classList.toggle("sifted", Boolean(query) && !found.length);
+if (node.tagName !== "DETAILS") continue;
+if(query)node.open=found.length>0;
+else node.open = byHand.get(group) ?? node.classList.contains("changed");
+}
+};
+return{
+element: element("div", { class: "folds" }, ...parts.map(({ node }) => node)),
+show(values){
+for(const{group,own,told,node}of parts){
+const changed=own.filter(({name})=>rows.get(name).isChanged());
+const texts=changed.slice(0,MOST_WORDS).map((field)=>words(field,values[field.name],group));
+const text = [...texts, ...(changed.length > MOST_WORDS ? ["…"] : [])].join(", ");
+if(told.textContent !==text)told.textContent=text;
+node.classList.toggle("changed", changed.length > 0);
+}
+if(!isMade)sift();
+isMade=true;
+},
+reveal(name){
+const node = rows.get(name)?.element.closest("details.fold");
+if(node)node.open=true;
+},
+filter(text){
+query=text.trim().toLowerCase();
+sift();
+},
+};
+}
+return { folds };
+})();
+const lib_files = (() => {
+function acceptFiles(node,take){
+node.addEventListener("dragover", (event) => {
+if (!event.dataTransfer.types.includes("Files")) return;
+event.preventDefault();
+event.stopPropagation();
+node.classList.add("over");
+});
+node.addEventListener("dragleave", () => node.classList.remove("over"));
+node.addEventListener("drop", (event) => {
+node.classList.remove("over");
+const [file]=event.dataTransfer.files;
+if(!file)return;
+event.preventDefault();
+take(file);
+});
+}
+return { acceptFiles };
+})();
+const lib_tooltip = (() => {
+const { element } = lib_dom;
+const PATIENCE_MS=350;
+const WRITTEN = ["text", "button"];
+const bubble = element("div", { class: "tooltip", "aria-hidden": "true", hidden: true });
+let timer=0;
+function open(row,text){
+bubble.textContent=text;
+document.body.append(bubble);
+bubble.hidden=false;
+const box=row.getBoundingClientRect();
+const below=box.bottom + bubble.offsetHeight + 8<window.innerHeight;
+bubble.style.setProperty(
+"left",
+`${Math.max(8, Math.min(box.left, window.innerWidth - bubble.offsetWidth - 8))}px`,
+);
+bubble.style.setProperty("top", `${below ? box.bottom + 4 : box.top - bubble.offsetHeight - 4}px`);
+}
+function closeTooltip(){
+clearTimeout(timer);
+bubble.hidden=true;
+}
+function describe(row,handle,text){
+handle.addEventListener("pointerenter", () => {
+clearTimeout(timer);
+timer=setTimeout(open,PATIENCE_MS,row,text);
+});
+handle.addEventListener("pointerleave", closeTooltip);
+row.addEventListener("focusin", ({ target }) => {
+if (!WRITTEN.includes(target.type) && target.matches(":focus-visible")) open(row, text);
+});
+row.addEventListener("focusout", closeTooltip);
+row.addEventListener("pointerdown", closeTooltip);
+row.addEventListener("keydown", (event) => {
+if (event.key === "Escape") closeTooltip();
+});
+}
+return { describe };
+})();
+const forms_schema_form = (() => {
+const { linear } = lib_color;
+const { control } = forms_controls;
+const { element, freshId } = lib_dom;
+const { folds } = forms_folds;
+const { acceptFiles } = lib_files;
+const { equal, isObject } = lib_patch;
+const { followed } = server_schema;
+const { scrubBy } = lib_scrub;
+const { endsOf } = lib_span;
+const { describe } = lib_tooltip;
+const { unitText } = lib_format_text;
+const isSame=({widget},a,b)=>
+widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+const isTexture=(value)=>isObject(value)&&value.texture !==undefined;
+function row(field,{change,commit,forgive,takeFile,slot,beneath}){
+const id=freshId(field.name);
+const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
+const mark=(text)=>{
+trouble.hidden=!text;
+trouble.textContent = text ?? "";
+for (const input of node.querySelectorAll("input, select")) {
+if(under?.element.contains(input))continue;
+if (text) input.setAttribute("aria-invalid", "true");
+else input.removeAttribute("aria-invalid");
+}
+};
+let latest;
+let isChanged=false;
+const widget=control(field,id,{
+input:(value)=>{
+mark(null);
+change(field.name,value);
+},
+commit,
+refuse:mark,
+restore:()=>{
+mark(null);
+widget.show(latest);
+forgive();
+},
+});
+const reset = element("button", {
+type: "button",
+class: "reset",
+"aria-label": `Reset ${field.title}`,
+onclick:()=>{
+mark(null);
+change(field.name,undefined);
+commit();
+},
+});
+const label = element("label", { for: id }, field.title);
+if(field.unit){
+const unit=unitText(field.unit);
+label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
+}
+if(widget.drag)scrubBy(label,widget.drag);
+const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
+const image=field.takesTexture
+? slot?.(field,()=>{
+change(field.name,undefined);
+commit();
+})
+:undefined;
+const under=image&&beneath?.(field);
+const parts=[label,widget.element,image?.chip,image?.button,reset,under?.element,hint,trouble].filter(
+Boolean,
+);
+const node = element("div", { class: image ? "field pictured" : "field", "data-field": field.name }, ...parts);
+if(image&&takeFile)acceptFiles(node,(file)=>takeFile(field.name,file));
+for (const input of node.querySelectorAll("input, select")) {
+input.setAttribute("aria-describedby", `${hint ? hint.id : ""} ${trouble.id}`.trim());
+}
+if(hint)describe(node,label,field.hint);
+return{
+element:node,
+mark,
+isChanged:()=>isChanged,
+show(value,initial=field.initial,effective=undefined,ends=undefined){
+latest=value ?? initial;
+const textured=isTexture(latest);
+if(image){
+widget.element.hidden = textured || field.widget === "texture";
+image.show(latest);
+under?.show(latest);
+}
+if(trouble.hidden&&!textured)widget.show(latest,effective,ends);
+isChanged=value !==undefined&&!isSame(field,value,initial);
+reset.hidden=textured||field.required||!isChanged;
+},
+};
+}
+function schemaForm(fields,acts){
+const rows=new Map(fields.map((field)=>[field.name,row(field,acts)]));
+const parts=fields.some(({group})=>group)? folds(rows,fields):null;
+return{
+element: parts?.element ?? element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
+filter:(text)=>parts?.filter(text),
+show(values,initials={}){
+for(const [name,each] of rows){
+const field=fields.find((one)=>one.name===name);
+const valueOf=(leader)=>values[leader] ?? fields.find((one)=>one.name===leader)?.initial;
+const ends=field.ranges&&endsOf(field,valueOf(field.ranges.field));
+each.show(values[name],initials[name],followed(field,valueOf(field.follows?.field)),ends);
+each.element.classList.toggle(
+"unused",
+Boolean(field.used)&&!field.used.values.includes(valueOf(field.used.field)),
+);
+}
+parts?.show(values);
+},
+mark(name,text){
+rows.get(name)?.mark(text);
+if(text)parts?.reveal(name);
+return rows.has(name);
+},
+forgive(){
+for(const each of rows.values())each.mark(null);
+},
+};
+}
+return { schemaForm };
+})();
+const widget_panel = (() => {
+const { element, freshId } = lib_dom;
+const { isObject, pointer, put } = lib_patch;
+const { schemaForm } = forms_schema_form;
+const { fields, materialModels } = server_schema;
+const option = (value, title = value) => element("option", { value }, title);
+function slot(){
+const chip = element("span", { class: "chip" });
+return{
+chip,
+show(value){
+chip.hidden=!(isObject(value)&&value.texture !==undefined);
+if(!chip.hidden)chip.textContent=value.texture;
+},
+};
+}
+const isSlid = ({ widget }) => widget !== "texture";
+function menu(title,entries,act){
+const select=element(
+"select",
+{
+"aria-label": title,
+onchange:()=>{
+const{value}=select;
+select.value = "";
+if(value)act(value);
+},
+},
+option("", `${title}…`),
+...entries.map(({name,title:words})=>option(name,words)),
+);
+return select;
+}
+function panel({schema,presets,current,change,take,choose,home}){
+const models=materialModels(schema);
+const id = freshId("material");
+const materials = element("select", { id, onchange: () => choose(materials.value) });
+const place = element("div", { class: "parameters" });
+let name = "";
+let form=null;
+const give = (field, value) => change(put(current(), pointer("materials", name, field), value));
+const made=(type)=>{
+const made=schemaForm(fields(schema,models[type]).filter(isSlid),{
+change:give,
+commit(){},
+forgive(){},
+slot,
+});
+place.replaceChildren(made.element);
+return{type,...made};
+};
+const inside=element(
+"div",
+{ class: "inside" },
+element(
+"div",
+{ class: "menus" },
+menu("Scene", presets.scenes, (value) => take("scenes", value)),
+menu("Environment", presets.environments, (value) => take("environments", value)),
+element("button", { type: "button", onclick: home }, "Reset view"),
+),
+element(
+"div",
+{ class: "menus material" },
+element("label", { for: id }, "Material"),
+materials,
+menu("Library", presets.materials, (value) => take("materials", value)),
+),
+place,
+);
+return{
+element: element("div", { class: "panel" }, inside),
+show(scene,chosen){
+const names=Object.keys(scene.materials);
+if (names.join("\n") !== [...materials.options].map(({ value }) => value).join("\n"))
+materials.replaceChildren(...names.map((each)=>option(each)));
+materials.value=chosen;
+name=chosen;
+const material=scene.materials[chosen];
+if(!material||!models[material.type]){
+place.replaceChildren();
+form=null;
+return;
+}
+if(form?.type !==material.type)form=made(material.type);
+form.show(material);
+},
+mark:(place,text)=>{
+const [, , material, field] = place.split("/");
+return material===name&&Boolean(form?.mark(field,text));
+},
+};
+}
+return { panel };
+})();
+const lib_vector = (() => {
+const add=(a,b)=>a.map((x,i)=>x + b[i]);
+const subtract=(a,b)=>a.map((x,i)=>x - b[i]);
+const scale=(a,s)=>a.map((x)=>x * s);
+const dot=(a,b)=>a.reduce((sum,x,i)=>sum + x * b[i],0);
+const cross=([a,b,c],[x,y,z])=>[b * z - c * y,c * x - a * z,a * y - b * x];
+const length=(a)=>Math.hypot(...a);
+const normalize = (a) => scale(a, 1 / length(a));
+const tidy=(a)=>a.map((x)=>Number(x.toPrecision(7)));
+function turn(v,axis,angle){
+const [c,s]=[Math.cos(angle),Math.sin(angle)];
+return add(add(scale(v,c),scale(cross(axis,v),s)),scale(axis,dot(axis,v)*(1 - c)));
+}
+return { add, cross, dot, length, normalize, scale, subtract, tidy, turn };
+})();
+const document_camera = (() => {
+const { add, cross, dot, length, normalize, scale, subtract, tidy, turn } = lib_vector;
+const POLE = (2 * Math.PI) / 180;
+const radians = (degrees) => (degrees * Math.PI) / 180;
+function swing(arm,up,right,down){
+const pole=normalize(up);
+const turned=turn(arm,pole,-right);
+const side=normalize(cross(pole,turned));
+const now=Math.acos(Math.min(Math.max(dot(pole,normalize(turned)),-1),1));
+const wanted=Math.min(Math.max(now - down,POLE),Math.PI - POLE);
+return turn(turned,side,wanted - now);
+}
+const orbit=({position,target,up},right,down)=>({
+position:tidy(add(target,swing(subtract(position,target),up,right,down))),
+});
+function axes({position,target,up}){
+const view=subtract(target,position);
+const forward=normalize(view);
+const right=normalize(cross(forward,up));
+return{right,up:cross(right,forward),forward,distance:length(view)};
+}
+const halfHeight = ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2);
+function pan(camera,right,down){
+const{position,target}=camera;
+const frame=axes(camera);
+const height=2 * halfHeight(camera,frame.distance);
+const shift=add(scale(frame.right,-right * height),scale(frame.up,down * height));
+return{position:tidy(add(position,shift)),target:tidy(add(target,shift))};
+}
+const zoom=({position,target},factor)=>({
+position:tidy(add(target,scale(subtract(position,target),factor))),
+});
+function frame(camera,{center,radius},aspect,share=0.8){
+const{position,target}=camera;
+const half=Math.atan(halfHeight(camera,1)* Math.min(1,aspect));
+const distance = radius / Math.sin(Math.max(half * share, 1e-3));
+const back=normalize(subtract(position,target));
+return{position:tidy(add(center,scale(back,distance))),target:tidy(center)};
+}
+return { axes, frame, halfHeight, orbit, pan, zoom };
+})();
+const picture_gestures = (() => {
+const ORBIT_PER_WIDTH=Math.PI;
+const LOOK_PER_WIDTH = Math.PI / 3;
+const WHEEL_ZOOM=0.0015;
+const WHEEL_UNITS=[1,16,400];
+const STILL=4;
+const WHEEL_REST_MS=400;
+const middle=(points)=>({
+x: points.reduce((sum, p) => sum + p.x, 0) / points.length,
+y: points.reduce((sum, p) => sum + p.y, 0) / points.length,
+spread:points.length>1 ? Math.hypot(points[0].x - points[1].x,points[0].y - points[1].y):0,
+});
+function watchGestures(stage,move,tool){
+const fingers=new Map();
+let last=null;
+let began=null;
+let kind = "orbit";
+let turning=0;
+stage.addEventListener("contextmenu", (event) => event.preventDefault());
+const meaning=(event)=>{
+if (tool() === "inspect") return "slide";
+if (event.button !== 0 || event.shiftKey) return "pan";
+if (event.altKey) return "turn";
+return tool() === "fly" ? "look" : "orbit";
+};
+const drag=(right,down)=>{
+const [w,h]=[stage.clientWidth,stage.clientHeight];
+if (kind === "slide") move.slide(right, down);
+else if (fingers.size > 1 || kind === "pan") move.pan(right / h, down / h);
+else if (kind === "turn") move.turn(right / w);
+else if (kind === "look") move.look((right / w) * LOOK_PER_WIDTH, (down / w) * LOOK_PER_WIDTH);
+else move.orbit((right / w) * ORBIT_PER_WIDTH, (down / w) * ORBIT_PER_WIDTH);
+};
+stage.addEventListener("pointerdown", (event) => {
+stage.setPointerCapture(event.pointerId);
+if(event.button===1)event.preventDefault();
+fingers.set(event.pointerId,{x:event.clientX,y:event.clientY});
+last=middle([...fingers.values()]);
+if(fingers.size===1){
+kind=meaning(event);
+began=event.button===0 ? last:null;
+}else began=null;
+});
+stage.addEventListener("pointermove", (event) => {
+move.hover(event.clientX,event.clientY);
+if(!fingers.has(event.pointerId))return;
+fingers.set(event.pointerId,{x:event.clientX,y:event.clientY});
+const now=middle([...fingers.values()]);
+if(began&&Math.hypot(now.x - began.x,now.y - began.y)<STILL)return;
+began=null;
+stage.classList.add("held");
+drag(now.x - last.x,now.y - last.y);
+if (last.spread > 0 && now.spread > 0) move.zoom(last.spread / now.spread, now.x, now.y);
+last=now;
+});
+const lift=(event)=>{
+if(!fingers.delete(event.pointerId))return;
+last=fingers.size ? middle([...fingers.values()]):null;
+if(fingers.size)return;
+stage.classList.remove("held");
+if (began && event.type === "pointerup") move.tap(event.clientX, event.clientY, event.altKey);
+else move.rest();
+began=null;
+};
+stage.addEventListener("pointerup", lift);
+stage.addEventListener("pointercancel", lift);
+stage.addEventListener(
+"wheel",
+(event)=>{
+event.preventDefault();
+clearTimeout(turning);
+turning=setTimeout(move.rest,WHEEL_REST_MS);
+const scrolled=event.deltaY * WHEEL_UNITS[event.deltaMode] * WHEEL_ZOOM *(event.ctrlKey ? 4:1);
+move.zoom(Math.exp(scrolled),event.clientX,event.clientY);
+},
+{passive:false},
+);
+}
+return { watchGestures };
+})();
+const widget_picture = (() => {
+const { orbit, pan, zoom } = document_camera;
+const { element } = lib_dom;
+const { watchGestures } = picture_gestures;
+const KEY_ORBIT = Math.PI / 24;
+const KEY_ZOOM=1.1;
+const STEPS={ArrowLeft:[-1,0],ArrowRight:[1,0],ArrowUp:[0,-1],ArrowDown:[0,1]};
+const ZOOMS = { "+": 1 / KEY_ZOOM, "=": 1 / KEY_ZOOM, "-": KEY_ZOOM };
+function picture({camera,move}){
+const canvas = element("canvas", {
+tabindex: "0",
+role: "img",
+"aria-label": "Picture. Drag to orbit, with Shift to pan; arrow keys orbit, plus and minus zoom.",
+});
+const stage = element("div", { class: "stage" }, canvas);
+const by=(change,...amounts)=>move(change(camera(),...amounts));
+watchGestures(
+canvas,
+{
+orbit:(right,down)=>by(orbit,right,down),
+pan:(right,down)=>by(pan,right,down),
+zoom:(factor)=>by(zoom,factor),
+turn(){},
+look(){},
+slide(){},
+hover(){},
+tap(){},
+rest(){},
+},
+() => "orbit",
+);
+canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
+stage.addEventListener(
+"wheel",
+(event)=>{
+if(document.activeElement !==canvas&&!event.ctrlKey)event.stopPropagation();
+},
+{capture:true},
+);
+canvas.addEventListener("keydown", (event) => {
+if(event.ctrlKey||event.metaKey||event.altKey)return;
+const step=STEPS[event.key];
+if (step && event.shiftKey) by(pan, step[0] / 20, step[1] / 20);
+else if(step)by(orbit,step[0] * KEY_ORBIT,step[1] * KEY_ORBIT);
+else if(ZOOMS[event.key])by(zoom,ZOOMS[event.key]);
+else return;
+event.preventDefault();
+event.stopPropagation();
+});
+let shown={generation:-1,seq:-1};
+return{
+element:stage,
+async paint(frame,bytes){
+const image=await createImageBitmap(new Blob([bytes],{type:frame.mime}));
+const isOlder=frame.generation<shown.generation;
+if(!isOlder){
+shown=frame;
+Object.assign(canvas,{width:image.width,height:image.height});
+canvas.getContext("2d").drawImage(image, 0, 0);
+canvas.style.setProperty("aspect-ratio", `${image.width} / ${image.height}`);
+}
+image.close();
+},
+};
+}
+return { picture };
+})();
+const widget_widget = (() => {
+const { beginIds, element } = lib_dom;
+const { amount, percent } = lib_format_text;
+const { diff } = lib_patch;
+const { defaults, property } = server_schema;
+const { panel } = widget_panel;
+const { picture } = widget_picture;
+const PATIENCE_MS=2000;
+const BUSY = "The kernel is busy. The picture follows when it is free.";
+function view({model,el}){
+beginIds(crypto.getRandomValues(new Uint16Array(1))[0] * 1000);
+const me=crypto.randomUUID();
+const status = element("output", { class: "status", role: "status" });
+const samples = element("span", { class: "samples" });
+let scene=null;
+let sent=null;
+let home=null;
+let schema=null;
+let side=null;
+let waits=0;
+let number=0;
+const send=(type,more)=>model.send({type,view:me,...more});
+const say=(text)=>{
+status.textContent=text;
+};
+const flush=()=>{
+if(waits||!scene)return;
+const patch=diff(sent,scene);
+if(patch===undefined)return;
+sent=scene;
+number +=1;
+waits=setTimeout(say,PATIENCE_MS,BUSY);
+send("edit", { number, patch });
+};
+const change=(next)=>{
+scene=next;
+show();
+flush();
+};
+const camera = () => ({ ...defaults(schema, property(schema, schema, "camera")), ...scene.camera });
+const move=(changes)=>{
+if(scene)change({...scene,camera:{...scene.camera,...changes}});
+};
+const canvas=picture({camera,move});
+const show = () => side?.show(scene, model.get("material"));
+const heard={
+begin({schema:described,presets,scene:first}){
+schema=described;
+side=panel({
+schema,
+presets,
+current:()=>scene,
+change,
+take: (kind, name) => send("preset", { kind, name }),
+choose(name){
+model.set("material", name);
+model.save_changes();
+},
+home:()=>move({...home}),
+});
+root.append(side.element);
+heard.scene({scene:first,is_home:true});
+},
+scene({scene:next,is_home:isHome,but}){
+if(!side||but===me)return;
+scene=next;
+sent=next;
+if(isHome)home=next.camera;
+say("");
+show();
+},
+taken({number:taken}){
+if(taken !==number)return;
+clearTimeout(waits);
+waits=0;
+if (status.textContent === BUSY) say("");
+flush();
+},
+refused({pointer,detail,scene:last}){
+heard.scene({scene:last});
+if (!side?.mark(pointer, detail)) say(pointer ? `${pointer}: ${detail}` : detail);
+},
+async frame(frame,[bytes]){
+try{
+await canvas.paint(frame,bytes);
+}finally{
+send("ack", { seq: frame.seq });
+}
+const noise = frame.noise === null ? "" : `, ${percent(frame.noise)} noise`;
+samples.textContent = `${amount(frame.samples, "sample")}${noise}`;
+},
+};
+const hear=(message,buffers)=>{
+if(!message.view||message.view===me)heard[message.type]?.(message,buffers);
+};
+const root=element(
+"div",
+{
+class: "sunbox-view",
+onfocusin: ({ target }) => target.setAttribute("data-lm-suppress-shortcuts", "true"),
+},
+element("div", { class: "shown" }, canvas.element, element("div", { class: "line" }, samples, status)),
+);
+el.append(root);
+model.on("msg:custom", hear);
+model.on("change:material", show);
+let isSeen=true;
+const look=(isIn)=>{
+const seen = isIn && document.visibilityState === "visible";
+if(seen===isSeen)return;
+isSeen=seen;
+send(seen ? "seen" : "unseen");
+};
+let isIn=true;
+const observer=new IntersectionObserver((entries)=>{
+isIn=entries.at(-1).isIntersecting;
+look(isIn);
+});
+const turned=()=>look(isIn);
+observer.observe(canvas.element);
+document.addEventListener("visibilitychange", turned);
+send("hello");
+return()=>{
+observer.disconnect();
+document.removeEventListener("visibilitychange", turned);
+model.off("msg:custom", hear);
+model.off("change:material", show);
+clearTimeout(waits);
+send("unseen");
+};
+}
+const $default={render:view};
+return { default: $default };
+})();
+export default widget_widget.default;
