@@ -37,6 +37,8 @@ export function makeHeader({
       },
       openFiles,
       addFiles,
+      showKeys: () => find("help").click(),
+      toggleTheme: () => find("theme").click(),
       complain,
       announce: say,
     },

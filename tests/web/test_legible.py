@@ -130,7 +130,9 @@ def test_a_phone_gives_its_picture_room_and_lists_gestures_first(at: Editor) -> 
     assert stage and bar and way_out
     assert bar["height"] < 0.17 * stage["height"]
     assert way_out["x"] + way_out["width"] <= 390, "the way out is in sight"
-    page.tap("#help")
+    page.tap("#scene-menu")
+    page.get_by_role("button", name="Keys and gestures").tap()
+    at.wait("the sheet", lambda: page.is_visible("#keys h3"))
     assert page.locator("#keys h3").first.inner_text() == "Fingers on the picture"
 
 

@@ -201,6 +201,34 @@ def test_a_phone_has_colour_and_roughness_on_its_first_screen(at: Editor) -> Non
     assert tops == sorted(tops)
 
 
+PHONE = {"has_touch": True, "is_mobile": True}
+
+
+@pytest.mark.parametrize("at", [(390, 844, PHONE), (320, 640, PHONE)], indirect=True)
+def test_a_phone_names_the_scene_adds_things_and_searches(at: Editor) -> None:
+    page = at.page
+    cut = "(id) => { const { scrollWidth: w, clientWidth: c, scrollHeight: h, clientHeight: d } = "
+    cut += "document.getElementById(id); return w > c || h > d; }"
+    assert at.text("#scene-title") == "Sphere on a floor"
+    width = (page.viewport_size or {})["width"]
+    assert not page.evaluate(cut, "scene-title") or width < 390, "on two lines at most"
+    for id in ("tab-materials", "tab-environments", "tab-scenes", "tab-renders", "search-library", "add"):
+        box = page.locator(f"#{id}").bounding_box()
+        assert box and box["x"] >= 0 and box["x"] + box["width"] <= width, id
+        middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+        assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).id", middle) == id, "nothing lies over it"
+    count = len(document(at)["shapes"])
+    assert page.is_hidden("#outline-list")
+    page.select_option("#add", label="Sphere")
+    at.wait("the sphere", lambda: len(document(at)["shapes"]) == count + 1)
+    page.tap("#search-library")
+    page.keyboard.type("copper")
+    assert "Copper" in names(at, "Library") and "Gold" not in names(at, "Library")
+    page.tap("#scene-menu")
+    page.get_by_role("button", name="Keys and gestures").tap()
+    at.wait("what fingers do", lambda: "two fingers" in at.text("#keys-dialog"))
+
+
 @pytest.mark.parametrize("at", [(1024, 768), (1440, 900), (2560, 1440)], indirect=True)
 def test_wide_windows_use_their_width(at: Editor) -> None:
     page = at.page

@@ -12,7 +12,7 @@ const button = (label, does, more = {}) =>
 
 export class SceneMenu {
   // `acts` has scene(), title(), open(document, title), named(title), state(), snapshot() -> {blob, note},
-  // restore(essence), openFiles(), addFiles(), complain(error), announce(text).
+  // restore(essence), openFiles(), addFiles(), showKeys(), toggleTheme(), complain(error), announce(text).
   constructor(root, { acts }) {
     this.acts = acts;
     const files = element(
@@ -35,6 +35,13 @@ export class SceneMenu {
         element("p", { class: "note" }, "Or drop a model, an environment or an image on the picture."),
       ),
       this.#snapshots(),
+      // Where the header has no room for their buttons.
+      element(
+        "div",
+        { class: "row narrow" },
+        button("Keys and gestures", acts.showKeys),
+        button("Light or dark", acts.toggleTheme),
+      ),
     );
   }
 
