@@ -153,8 +153,8 @@ export function laterParts({
     finals,
     // Has them ready for a hand, now that nothing waits for the network.
     prepare() {
-      for (const part of all) part.prepare();
-      for (const rest of [import("./lib/ask.js"), import("./lib/name-entry.js")]) rest.catch(() => {});
+      const modules = [import("./lib/ask.js"), import("./lib/name-entry.js"), import("./keys-sheet.js")];
+      return Promise.allSettled([...all.map((part) => part.get()), ...modules]);
     },
   };
 }

@@ -10,6 +10,7 @@ import { Frame } from "./panels/frame.js";
 import { askForKey } from "./server/key.js";
 import { watchKeys } from "./keys.js";
 import { laterParts } from "./later.js";
+import { LastPicture, subject } from "./panels/last-picture.js";
 import { LobeOnDemand } from "./lobe/on-demand.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
@@ -57,13 +58,17 @@ const complain = (problem) => {
   messages.show("refusal", { title: problemText(problem, titles) });
 };
 
+const lastPicture = new LastPicture(find("last-picture"), find("preparing"));
 let editor = null;
 const { schema, library, name, scene, left } = await boot({
   keyDialog: find("key-dialog"),
   complain,
+  begins: (work, builtIn) =>
+    lastPicture.show(subject({ ...work, hidden: work?.chosen?.hidden }, work ? null : builtIn)),
   told(problem) {
     if (!problem) return messages.hide("connection");
     status.state("Offline");
+    find("preparing").hidden = true;
     messages.show("connection", { title: "The server does not answer.", detail: "Trying again…", lasting: true });
   },
 });
@@ -92,18 +97,29 @@ const viewport = new Viewport(find("picture"), {
     const isFirst = !page.header;
     root.classList.add("live");
     page.paint(frame);
-    preparing.end();
+    preparing.painted();
+    lastPicture.end();
     status.frame(frame.header, page.limit);
     controller.painted(frame);
     comparison.now?.painted();
     if (ui.state.tab === "render") finals.now?.show();
     tellState();
+    keepPicture();
     if (!isFirst) return;
     performance.mark("first picture");
     begin();
-    later.prepare();
+    later.prepare().then(() => performance.mark("all parts"));
   },
 });
+
+function keepPicture() {
+  const { header, isWaiting, painted } = page;
+  const { scene, chosen } = editor.state;
+  if (header.scale < 1 || isWaiting || !stream.isNewest(painted)) return;
+  if (ui.state.layer !== "color" || compared(editor.state)) return;
+  const builtIn = editor.canUndo || left ? null : name;
+  lastPicture.keep(viewport.canvas, () => subject({ scene, hidden: chosen.hidden }, builtIn));
+}
 
 const stream = new Stream({
   hello(info, isTakenUp) {
@@ -258,7 +274,10 @@ watchKeys(controller.keyMove, keys);
 const display = new DisplayControls({ find, page, ui, does: commands.does });
 
 watchDrops(document, {
-  take: (files, at) => importer.calls("take")(files, { at }),
+  take(files, at) {
+    ui.set({ hint: false });
+    importer.calls("take")(files, { at });
+  },
   tell(text) {
     find("drop").hidden = text === null;
     find("drop-hint").textContent = text ?? "";

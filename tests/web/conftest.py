@@ -140,6 +140,8 @@ class Editor:
         """With a scene that is quicker than the first one; "" goes on with what was left."""
         self.page.goto(f"{url}/{scene}")
         self.wait("a picture", lambda: self.samples() >= 1)
+        parts = "performance.getEntriesByName('all parts').length"
+        self.wait("what comes after the picture", lambda: self.page.evaluate(parts))
 
     def wait(self, what: str, reached: Callable[[], object]) -> None:
         deadline = time.monotonic() + PATIENCE_S

@@ -3,7 +3,7 @@
 
 const STORED = "sunbox.ui";
 export const HANDLED = ["move", "rotate", "scale"]; // the tools that put handles on the selection
-const LASTING = ["drawer", "theme", "lobe", "outline", "inspector"];
+const LASTING = ["drawer", "theme", "lobe", "outline", "inspector", "hint"];
 
 export class UiState {
   #listeners = [];
@@ -20,6 +20,7 @@ export class UiState {
     theme: null,
     lobe: false,
     outline: null, // shown or folded; null: as there is room
+    hint: true, // that files can be dropped: until one was, or nobody wants to read it any more
     inspector: null, // its width in CSS pixels; null: as there is room
   };
 

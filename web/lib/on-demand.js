@@ -26,11 +26,6 @@ export class OnDemand {
     return this.#loading;
   }
 
-  // Begins to load it. What goes wrong is said when somebody wants it.
-  prepare() {
-    this.get().catch(() => {});
-  }
-
   // A function that calls a method of the part.
   calls(name) {
     return (...given) => this.get().then((part) => part[name](...given), this.complain);

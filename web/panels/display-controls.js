@@ -20,6 +20,7 @@ export class DisplayControls {
     this.showTab = watchTabs(find("tabs"), ui.state.tab, (tab) => ui.set({ tab }));
     this.showDrawer = watchTabs(find("drawers"), ui.state.drawer, (drawer) => ui.set({ drawer }));
     watchMenu(find("view"), find("view-menu"));
+    find("dismiss-hint").addEventListener("click", () => ui.set({ hint: false }));
     this.layer = find("layer");
     this.layer.append(...page.layers.map((each) => element("option", { value: each }, inWords(each))));
     this.layer.addEventListener("change", () => ui.set({ layer: this.layer.value }));
@@ -45,6 +46,7 @@ export class DisplayControls {
     this.showTab(tab);
     this.showDrawer(drawer);
     this.layer.value = layer;
+    this.find("hint").hidden = !members.hint;
     const isOn = { ...members, checker: this.page.isCheckered };
     for (const member of Object.keys(OVERLAYS)) this.find(`show-${member}`).checked = isOn[member];
     if (theme) document.documentElement.dataset.theme = theme;

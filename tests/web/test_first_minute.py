@@ -1,0 +1,123 @@
+"""The page before its first picture, and what it says to whoever is new."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import BrowserContext, Page, WebSocketRoute
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.editing import halves
+
+KEPT = """async (name) => {
+    const { recall } = await import(new URL("lib/browser-storage.js", location));
+    return (await recall(`last picture ${name}`))?.of ?? null;
+}"""
+
+
+class Held:
+    """A stream whose frames wait until somebody lets them go."""
+
+    def __init__(self, page: Page) -> None:
+        self.isHolding = False
+        self.frames: list[tuple[WebSocketRoute, Any]] = []
+        page.route_web_socket("**/v1/stream**", self._pass_on)
+
+    def _pass_on(self, route: WebSocketRoute) -> None:
+        def hear(message: Any) -> None:
+            if self.isHolding and isinstance(message, bytes):
+                self.frames.append((route, message))
+            else:
+                route.send(message)
+
+        route.connect_to_server().on_message(hear)
+
+    def release(self) -> None:
+        self.isHolding = False
+        for route, frame in self.frames:
+            route.send(frame)
+        self.frames.clear()
+
+
+@pytest.fixture
+def held(editor: Editor) -> Iterator[Held]:
+    yield Held(editor.page)
+
+
+def visit(editor: Editor, url: str) -> None:
+    """As from a bookmark: an address that differs in its fragment alone would load nothing."""
+    editor.page.goto("about:blank")
+    editor.page.goto(url)
+    editor.page.wait_for_selector("#library [role=option]")
+
+
+def test_the_last_picture_of_a_scene_stands_until_the_next_is_there(
+    editor: Editor, held: Held, server: Server
+) -> None:
+    page = editor.page
+    last, label, scene = "#last-picture", "#preparing", f"{server.url}/#scene=sphere-on-floor"
+    editor.wait("a picture to be kept", lambda: page.evaluate(KEPT, "sphere-on-floor") == "")
+    held.isHolding = True
+    visit(editor, scene)
+    editor.wait("the last picture", lambda: page.is_visible(last))
+    assert editor.text(label).startswith("Preparing")
+    assert editor.text("#state") == "Preparing", "one word for one thing"
+    assert "blur" in page.evaluate("getComputedStyle(document.querySelector('#last-picture')).filter")
+    held.release()
+    editor.wait("the picture itself", lambda: page.is_hidden(last) and editor.samples() >= 1)
+    assert page.is_hidden(label)
+
+    held.isHolding = True
+    visit(editor, f"{server.url}/#scene=cornell-empty")
+    editor.wait("the words", lambda: page.is_visible(label))
+    assert page.is_hidden(last), "it is another scene"
+
+    held.release()
+    editor.wait("that one", lambda: editor.samples() >= 1)
+    page.focus("#stage")
+    page.keyboard.press("ArrowLeft")
+    scene_now = "JSON.parse(localStorage['sunbox.work ' + sessionStorage['sunbox.tab']] ?? 'null')?.scene"
+    same = lambda: json.loads(page.evaluate(KEPT, "work") or "[0]")[0] == page.evaluate(scene_now)  # noqa: E731
+    editor.wait("a picture of the work", same)
+    held.isHolding = True
+    visit(editor, server.url)
+    editor.wait("it again", lambda: page.is_visible(last))
+    assert editor.complaints == []
+
+
+def test_what_is_being_prepared_says_how_long_that_may_take(editor: Editor, held: Held) -> None:
+    page = editor.page
+    page.evaluate("localStorage['sunbox.preparing'] = JSON.stringify({ scene: [1, 400, 500, 600], change: [50] })")
+    held.isHolding = True
+    visit(editor, page.url)
+    editor.wait("the time", lambda: "left" in editor.text("#preparing"))
+    words = editor.text("#preparing").split("… ")[1]
+    seconds, left = (int(part.removeprefix("about ").split()[0]) for part in words.split(", "))
+    assert left == 500 - seconds, "the median of those that took longer"
+    held.release()
+    editor.wait("the picture", lambda: page.is_hidden("#preparing"))
+    kept = json.loads(page.evaluate("localStorage['sunbox.preparing']"))
+    assert seconds <= kept["scene"][-1] < 400 and kept["change"] == [50], "it is remembered for the next time"
+
+
+def test_a_hint_says_what_can_be_dropped_until_something_was(
+    editor: Editor, context: BrowserContext, server: Server
+) -> None:
+    page = editor.page
+    assert editor.text("#hint").startswith("Drop a model, an environment, a texture")
+    editor.drop("#stage", {"halves.png": halves()})
+    assert page.is_hidden("#hint")
+    second = Editor(context.new_page())
+    second.open(server.url)
+    assert second.page.is_hidden("#hint"), "for good"
+    second.page.evaluate("localStorage.removeItem('sunbox.ui')")
+    second.page.reload()
+    second.page.get_by_role("button", name="Dismiss this hint").click()
+    assert second.page.is_hidden("#hint")
+    second.page.reload()
+    second.page.wait_for_selector("#library [role=option]")
+    assert second.page.is_hidden("#hint")
