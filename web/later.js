@@ -62,6 +62,7 @@ export function laterParts({
       ),
     { complain, arrived: () => push() },
   );
+  comparison.nears(find("compare")); // it is large, and not everybody compares
 
   const textures = new OnDemand(
     () => import("./forms/texture-thumbnails.js"),
@@ -143,7 +144,7 @@ export function laterParts({
     { complain, arrived: (made) => page.info && made.show() },
   );
 
-  const all = [comparison, textures, adder, importer, menus, stage, finals, controller.tools];
+  const all = [textures, adder, importer, menus, stage, finals, controller.tools];
   return {
     comparison,
     textures,

@@ -17,7 +17,7 @@ FIRST_PICTURE = """performance.getEntriesByName("first picture")[0].startTime"""
 MOST_BEFORE_THE_PICTURE = 200_000
 MOST = 300_000
 # What a hand needs only once there is a picture, one file of each part.
-LATER = ("comparison.js", "final-pictures.js", "importer.js", "adding.js", "header.js", "tools.js", "renders.css")
+LATER = ("final-pictures.js", "importer.js", "adding.js", "header.js", "tools.js", "renders.css")
 
 
 @pytest.mark.usefixtures("editor")  # after that the server has its kernel: this visit waits for the network alone
@@ -36,7 +36,7 @@ def test_a_first_visit_is_light(browser: Browser, server: Server) -> None:
     assert sum(answer["bytes"] for answer in answers) <= MOST, heaviest
     assert all(answer["bytes"] > 0 for answer in answers), "nothing came from a cache"
     assert len(names) == len(set(names)), "nothing is fetched twice"
-    unasked = ("/openapi.json", "/lobe/panel.js", "/lobe.css")
+    unasked = ("/openapi.json", "/lobe/panel.js", "/lobe.css", "/compare/comparison.js", "/compare.css")
     assert not [name for name in names if name.endswith(unasked)], "nobody asked for these"
     early = {answer["name"].rsplit("/", 1)[-1] for answer in before}
     late = {name.rsplit("/", 1)[-1] for name in names} - early
@@ -45,11 +45,15 @@ def test_a_first_visit_is_light(browser: Browser, server: Server) -> None:
     context.close()
 
 
-def test_the_lobe_comes_when_a_hand_comes_near_its_button(editor: Editor) -> None:
+@pytest.mark.parametrize(
+    ("code", "button", "shown"),
+    [("/lobe/panel.js", "#show-lobe", "#lobe h2"), ("/compare/comparison.js", "#compare", "#comparison select")],
+)
+def test_a_part_comes_when_a_hand_comes_near_its_button(editor: Editor, code: str, button: str, shown: str) -> None:
     page = editor.page
-    assert not [url for url in editor.requests if url.endswith("/lobe/panel.js")]
-    page.hover("#show-lobe")
-    editor.wait("the panel's code", lambda: any(url.endswith("/lobe/panel.js") for url in editor.requests))
-    page.click("#show-lobe")
-    editor.wait("the panel", lambda: page.is_visible("#lobe h2"))
+    assert not [url for url in editor.requests if url.endswith(code)]
+    page.hover(button)
+    editor.wait("the part's code", lambda: any(url.endswith(code) for url in editor.requests))
+    page.click(button)
+    editor.wait("the part", lambda: page.locator(shown).first.is_visible())
     assert editor.complaints == []

@@ -31,6 +31,11 @@ export class OnDemand {
     return (...given) => this.get().then((part) => part[name](...given), this.complain);
   }
 
+  // It is loaded as a hand comes near a button. What goes wrong is said when that is pressed.
+  nears(button) {
+    for (const near of ["pointerenter", "focus"]) button.addEventListener(near, () => this.get().catch(() => {}));
+  }
+
   // What opens only with the part's own content waits for it.
   opens(popover) {
     popover.addEventListener("beforetoggle", (event) => {
