@@ -22,6 +22,8 @@ from mcp.client.stdio import StdioServerParameters
 from mcp_types import CallToolResult, ImageContent, TextContent
 from PIL import Image
 
+from sunbox import agent_work
+from sunbox.agent_tools import agent_server
 from tests.serving import SCENE, Server, served
 
 TINY = {"width": 32, "height": 24, "max_samples": 8}
@@ -59,6 +61,13 @@ class Agent:
     def call(self, tool: str, **arguments: Any) -> CallToolResult:
         found: CallToolResult = self.do(self.client.call_tool(tool, arguments))
         return found
+
+    def done(self, tool: str, **arguments: Any) -> CallToolResult:
+        """The call's answer, asked for again while its work goes on, as on a machine that is slow."""
+        while (answer := self.call(tool, **arguments)).structured_content is not None:
+            if answer.structured_content.get("state") not in ("queued", "running"):
+                break
+        return answer
 
     def close(self) -> None:
         self.loop.call_soon_threadsafe(self.over.set)
@@ -107,22 +116,70 @@ def test_there_are_eight_tools(agent: Agent) -> None:
 
 
 def test_render(agent: Agent) -> None:
-    answer = agent.call("render", scene=SCENE, settings=TINY)
+    answer = agent.done("render", scene=SCENE, settings=TINY)
     found = result(answer)
     assert (found["state"], found["samples"], found["width"], found["shown_width"]) == ("done", 8, 32, 32)
     assert picture(answer).size == (32, 24) and np.asarray(picture(answer)).std() > 10
 
 
 def test_a_large_picture_is_scaled_down(agent: Agent) -> None:
-    answer = agent.call("render", scene=SCENE, settings={"width": 1600, "height": 900, "max_samples": 1})
+    answer = agent.done(
+        "render", scene=SCENE, settings={"width": 1600, "height": 900, "max_samples": 1, "max_bounces": 1}
+    )
     found = result(answer)
     assert (found["width"], found["height"]) == (1600, 900)
     assert picture(answer).size == (found["shown_width"], found["shown_height"]) == (1333, 750)
 
 
 def test_a_picture_is_small_unless_more_is_said(agent: Agent) -> None:
-    found = result(agent.call("render", scene="sphere-on-floor", settings={"max_samples": 1}))
+    found = result(agent.done("render", scene="sphere-on-floor", settings={"max_samples": 1}))
     assert (found["width"], found["height"], found["samples"]) == (512, 384, 1)
+
+
+def test_the_same_call_goes_on_with_the_same_render(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the place of a call that takes longer than a host waits; one that was cancelled is begun anew."""
+    monkeypatch.setattr(agent_work, "LONGEST_S", 0.5)
+    call = {"scene": SCENE, "settings": {**TINY, "max_samples": 1 << 24, "seed": 7}}
+
+    async def run() -> None:
+        async with Client(agent_server(server.url)) as client:
+            first = result(await client.call_tool("render", call))
+            assert first["state"] in ("queued", "running")
+            then = result(await client.call_tool("render", call))
+            assert then["render"] == first["render"] and then["samples"] >= first["samples"]
+            server.http.delete(f"/v1/renders/{first['render']}").raise_for_status()
+            anew = result(await client.call_tool("render", call))
+            assert anew["render"] != first["render"]
+            server.http.delete(f"/v1/renders/{anew['render']}").raise_for_status()
+
+    asyncio.run(run())
+
+
+def test_a_call_that_is_cancelled_cancels_its_render(server: Server) -> None:
+    call = {"scene": SCENE, "settings": {**TINY, "max_samples": 1 << 24, "seed": 8}}
+
+    def under_way() -> list[str]:
+        mine = [each for each in server.http.get("/v1/renders").json() if each["settings"]["seed"] == 8]
+        return [each["id"] for each in mine if each["state"] in ("queued", "running")]
+
+    async def run() -> None:
+        async with Client(agent_server(server.url)) as client:
+            called = asyncio.ensure_future(client.call_tool("render", call))
+            while not under_way():
+                await asyncio.sleep(0.02)
+            called.cancel()
+            while under_way():
+                await asyncio.sleep(0.02)
+
+    asyncio.run(asyncio.wait_for(run(), 120))
+
+
+def test_arguments_that_do_not_fit(agent: Agent) -> None:
+    assert pointers(agent.call("render", settings={})) == ["/scene"]
+    assert pointers(agent.call("inspect", scene=SCENE, x=-1, y="a")) == ["/x", "/y"]
+    assert pointers(agent.call("bsdf", material="brass", wo=[[0, 0, 1], [0, "z"]], wi=[])) == ["/wo/1/1", "/wi"]
+    assert pointers(agent.call("render", scene=7)) == ["/scene"]
+    assert result(agent.call("validate", scene=json.dumps(SCENE)))["valid"]  # as some hosts send it
 
 
 def test_a_patched_scene_has_a_name(agent: Agent, server: Server) -> None:
@@ -132,7 +189,7 @@ def test_a_patched_scene_has_a_name(agent: Agent, server: Server) -> None:
     assert name not in {each["name"] for each in server.http.get("/v1/documents/scenes").json()}
     again = result(agent.call("patch", scene=name, patch={"materials": {"ball": {"roughness": 0.4}}}))["scene"]
     assert again == result(agent.call("patch", scene=SCENE, patch={}))["scene"] != name
-    assert result(agent.call("render", scene=name, settings=TINY))["samples"] == 8
+    assert result(agent.done("render", scene=name, settings=TINY))["samples"] == 8
 
 
 def test_validate(agent: Agent) -> None:
@@ -157,7 +214,7 @@ def test_inspect(agent: Agent) -> None:
 
 def test_render_sheet(agent: Agent) -> None:
     path = "/materials/ball/base_color"
-    answer = agent.call("render_sheet", scene=SCENE, path=path, values=["#c00000", "#00c000"], settings=TINY)
+    answer = agent.done("render_sheet", scene=SCENE, path=path, values=["#c00000", "#00c000"], settings=TINY)
     found = result(answer)
     assert [each["value"] for each in found["pictures"]] == ["#c00000", "#00c000"]
     assert found["state"] == "done" and picture(answer).width > 64
@@ -173,7 +230,7 @@ def test_compare(agent: Agent, server: Server) -> None:
         return
     found = result(answer)
     assert found["different"] and found["p_value"] < 0.001 and picture(answer).size == (32, 24)
-    render = result(agent.call("render", scene=SCENE, settings=TINY))["render"]
+    render = result(agent.done("render", scene=SCENE, settings=TINY))["render"]
     assert not result(agent.call("compare", a=render, b=SCENE, settings=TINY))["different"]
     assert pointers(agent.call("compare", a=SCENE, b="0" * 32, settings=TINY)) == ["/b"]
 
@@ -247,7 +304,7 @@ def test_saved_scenes_belong_to_their_key(tmp_path: Path, monkeypatch: pytest.Mo
         try:
             keyed.http.headers["authorization"] = "Bearer anna"
             keyed.http.put("/v1/documents/scenes/mine", json=SCENE).raise_for_status()
-            assert result(agent.call("render", scene="mine", settings=TINY))["samples"] == 8
+            assert result(agent.done("render", scene="mine", settings=TINY))["samples"] == 8
         finally:
             agent.close()
 

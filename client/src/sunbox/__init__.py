@@ -19,6 +19,7 @@ document         the scene's document as types, generated from a server's schema
 mcp              `sunbox-mcp`: tools for agents, by the Model Context Protocol
 agent_tools      the eight tools
 agent_scenes     the scenes that they work on: documents and names, no files
+agent_work       renders and batches that the same question goes on with
 agent_answers    what they answer with
 generate         writes `document`
 local            `render` in this process

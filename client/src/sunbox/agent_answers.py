@@ -10,7 +10,7 @@ from typing import Any
 
 from mcp_types import CallToolResult, ContentBlock, ImageContent, TextContent
 from PIL import Image
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationError
 
 from sunbox.errors import SunboxError
 
@@ -27,7 +27,7 @@ class Problem(BaseModel):
 
 class RenderAnswer(BaseModel):
     render: str = Field(description="The render's id, which `compare` takes.")
-    state: str = Field(description="done; or cancelled, where it took too long: the picture has fewer samples.")
+    state: str = Field(description="done; or queued or running, where it takes long: the same call again goes on.")
     samples: int = Field(description="Per pixel.")
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean.")
     width: int
@@ -112,7 +112,22 @@ class Mistake(Exception):
 
     def __init__(self, pointer: str, detail: str) -> None:
         super().__init__(detail)
-        self.pointer, self.detail = pointer, detail
+        self.detail, self.errors = detail, [(pointer, detail)]
+
+
+class ArgumentsRefused(Mistake):
+    """Arguments do not have the types that the tool's schema says."""
+
+    def __init__(self, error: ValidationError) -> None:
+        super().__init__("", "The arguments do not fit the tool's schema.")
+        errors = error.errors(include_url=False, include_input=False, include_context=False)
+        # Of a union every alternative has complaints; behind the argument's name stand their names, and indices.
+        found = {_pointer(each["loc"]): each["msg"] for each in reversed(errors)}
+        self.errors = [(pointer, found[pointer]) for pointer in reversed(found)]
+
+
+def _pointer(place: tuple[int | str, ...]) -> str:
+    return "".join(f"/{step}" for step in (*place[:1], *(step for step in place[1:] if isinstance(step, int))))
 
 
 def answered(answer: BaseModel, picture: ImageContent | None = None) -> CallToolResult:
@@ -131,8 +146,6 @@ def refused(error: SunboxError | Mistake) -> CallToolResult:
 
 
 def problems(error: SunboxError | Mistake) -> list[Problem]:
-    if isinstance(error, Mistake):
-        return [Problem(pointer=error.pointer, detail=error.detail)]
     return [Problem(pointer=pointer, detail=detail) for pointer, detail in error.errors]
 
 

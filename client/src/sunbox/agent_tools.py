@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import functools
 import json
-import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import metadata
@@ -13,10 +12,12 @@ from typing import Annotated, Any, ParamSpec
 from urllib.parse import quote, urlencode
 
 from mcp.server import MCPServer
+from mcp.server.mcpserver.exceptions import ToolError
 from mcp_types import CallToolResult, ToolAnnotations
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from sunbox.agent_answers import (
+    ArgumentsRefused,
     BsdfAnswer,
     Comparison,
     Hit,
@@ -35,16 +36,17 @@ from sunbox.agent_answers import (
     shown,
 )
 from sunbox.agent_scenes import AgentScenes, refuse_files
+from sunbox.agent_work import work
 from sunbox.async_batch import AsyncBatch
-from sunbox.async_job import AsyncJob, AsyncPicture
+from sunbox.async_job import AsyncJob, AsyncPicture, Status
 from sunbox.errors import Failed, NotFound, Refused, SunboxError
 from sunbox.transport import Transport
 
-LONGEST_S = 50.0  # of one call: many hosts give up after a minute
-TIMEOUT_S, RETRIES = 60.0, 3
+TIMEOUT_S, RETRIES = 90.0, 3  # longer than one call waits
 MOST_VALUES = 36  # pictures of one sheet
 MOST_PAIRS = 256  # of directions: some 15 KB of numbers
 MOST_LISTED = 60  # materials
+MOST_SAMPLES = 4096  # of a render that stops by its noise, which it may never reach
 RENDER_ID = 32  # hexadecimal digits
 
 # What is rendered where the agent does not say: seconds on a processor.
@@ -111,9 +113,7 @@ def agent_server(url: str | None, key: str | None = None) -> MCPServer[None]:
         await tools.transport.close()
 
     version = metadata.version("sunbox")
-    server = MCPServer[None](
-        "sunbox", instructions=INSTRUCTIONS, version=version, lifespan=lifespan, log_level="WARNING"
-    )
+    server = _Server("sunbox", instructions=INSTRUCTIONS, version=version, lifespan=lifespan, log_level="WARNING")
     for tool, notes in (
         (tools.render, READS),
         (tools.render_sheet, READS),
@@ -134,6 +134,18 @@ def agent_server(url: str | None, key: str | None = None) -> MCPServer[None]:
     return server
 
 
+class _Server(MCPServer[None]):
+    """Arguments that don't fit a tool are refused as every other mistake."""
+
+    async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
+        try:
+            return await super().call_tool(name, arguments, context)
+        except ToolError as error:
+            if isinstance(error.__cause__, ValidationError):
+                return refused(ArgumentsRefused(error.__cause__))
+            raise
+
+
 class AgentTools:
     """The tools: their docstrings are what an agent reads of them."""
 
@@ -144,9 +156,25 @@ class AgentTools:
 
     @told
     async def render(self, scene: Scene, settings: Settings = None) -> Annotated[CallToolResult, RenderAnswer]:
-        """Renders a scene and shows the picture, of at most a megapixel. After 50 s the picture so far is shown."""
-        picture, id = await self._rendered(await self._scenes.document(scene), _with(PICTURE, settings))
-        return answered(*await self._picture(picture, id))
+        """Renders a scene and shows the picture, of at most a megapixel. What takes longer than 50 s is shown as it
+        is then, with the state `running`: the same call again goes on with it."""
+        found = await self._rendered(await self._scenes.document(scene), _with(PICTURE, settings))
+        status = found if isinstance(found, dict) else found.status
+        content, width, height = None, 0, 0
+        if not isinstance(found, dict):
+            content, width, height = await asyncio.to_thread(shown, await found.png())
+        answer = RenderAnswer(
+            render=status["id"],
+            state=status["state"],
+            samples=status["samples"],
+            noise=status["noise"],
+            width=status["settings"]["width"],
+            height=status["settings"]["height"],
+            shown_width=width,
+            shown_height=height,
+            warnings=status["warnings"],
+        )
+        return answered(answer, content)
 
     @told
     async def render_sheet(
@@ -158,22 +186,20 @@ class AgentTools:
         ],
         settings: Settings = None,
     ) -> Annotated[CallToolResult, SheetAnswer]:
-        """Renders a scene with several values at one place, and shows the pictures on one contact sheet."""
+        """Renders a scene with several values at one place, and shows the pictures on one contact sheet. After 50 s
+        those that are done are shown; the same call again goes on with the others."""
         for place, value in enumerate(values):
             refuse_files({path.rpartition("/")[2]: value}, f"/values/{place}")
         over = [{"path": path, "values": values}]
         body = {"scene": await self._scenes.document(scene), "settings": _with(SMALL, settings), "over": over}
-        batch = AsyncBatch(self.transport, await self._started("batches", body))
-        try:
-            async with asyncio.timeout(LONGEST_S):
-                status = await batch.wait(progress=False)  # cancelled, it cancels the batch
-        except TimeoutError:
-            status = await batch.status()
-        sheet = await batch.sheet()
+        status = await work(self.transport, "batches", body)
+        picture = None
+        if status["counts"]["done"]:
+            sheet = await AsyncBatch(self.transport, status["id"]).sheet()
+            picture, _, _ = await asyncio.to_thread(shown, sheet)
         members = zip(values, status["renders"], strict=True)
         pictures = [SheetPicture(value=value, render=each["id"], state=each["state"]) for value, each in members]
-        picture, _, _ = await asyncio.to_thread(shown, sheet)
-        return answered(SheetAnswer(batch=batch.id, state=status["state"], pictures=pictures), picture)
+        return answered(SheetAnswer(batch=status["id"], state=status["state"], pictures=pictures), picture)
 
     @told
     async def patch(
@@ -206,7 +232,9 @@ class AgentTools:
         """Says what is seen at a pixel: which shape and material, how far, its colour and normal. The picture has the
         size of `settings` (512 x 384 where they don't say)."""
         document = await self._scenes.document(scene)
-        picture, _ = await self._rendered(document, _with(PROBE, settings))
+        picture = await self._rendered(document, _with(PROBE, settings))
+        if isinstance(picture, dict):
+            raise Failed("The picture has no sample yet: ask again.", 504)
         color = await picture.numpy()
         height, width = color.shape[:2]
         for name, value, size in (("x", x, width), ("y", y, height)):
@@ -301,40 +329,12 @@ class AgentTools:
             self._models = sorted(each["properties"]["type"]["const"] for each in kinds)
         return self._models
 
-    async def _rendered(self, document: dict[str, Any], settings: dict[str, Any]) -> tuple[AsyncPicture, str]:
-        """The picture at the end, or so far when that takes too long, and the render's id."""
-        body = {"scene": document, "settings": settings}
-        job = AsyncJob(self.transport, await self._started("renders", body))
-        try:
-            async with asyncio.timeout(LONGEST_S):
-                return await job.result(progress=False), job.id  # cancelled, it cancels the render
-        except TimeoutError:
-            picture = await job.picture()
-        if not picture.samples:
-            raise Failed(f"The render had no sample after {LONGEST_S:g} s.", 504)
-        return picture, job.id
-
-    async def _started(self, kind: str, body: dict[str, Any]) -> str:
-        """The id of renders or batches; the request may be sent twice."""
-        key = {"idempotency-key": uuid.uuid4().hex}
-        return str((await self.transport.json("POST", f"/v1/{kind}", body, key))["id"])
-
-    @staticmethod
-    async def _picture(picture: AsyncPicture, id: str) -> tuple[RenderAnswer, Any]:
-        content, width, height = await asyncio.to_thread(shown, await picture.png())
-        status = picture.status
-        answer = RenderAnswer(
-            render=id,
-            state=status["state"],
-            samples=picture.samples,
-            noise=picture.noise,
-            width=picture.settings["width"],
-            height=picture.settings["height"],
-            shown_width=width,
-            shown_height=height,
-            warnings=picture.warnings,
-        )
-        return answer, content
+    async def _rendered(self, document: dict[str, Any], settings: dict[str, Any]) -> AsyncPicture | Status:
+        """The picture at the end, or so far where that takes long; the status where there is no sample yet."""
+        status = await work(self.transport, "renders", {"scene": document, "settings": settings})
+        if "problem" in status:
+            raise Failed(str(status["problem"]["detail"]), status["problem"].get("status"))
+        return await AsyncJob(self.transport, status["id"]).picture() if status["samples"] else status
 
     async def _side(self, name: str, side: dict[str, Any] | str, settings: dict[str, Any] | None) -> Any:
         """A scene with its settings, or the id of a render."""
@@ -344,7 +344,9 @@ class AgentTools:
 
 
 def _with(defaults: dict[str, Any], settings: dict[str, Any] | None) -> dict[str, Any]:
-    """The settings over the defaults; where they say when to stop, no number of samples is added."""
+    """The settings over the defaults, which say nothing of samples where the settings say when to stop."""
     given = dict(settings or {})
-    stops = {"quality", "time_limit", "target_noise"} & given.keys()
+    if "target_noise" in given:
+        return defaults | {"max_samples": MOST_SAMPLES} | given
+    stops = {"quality", "time_limit"} & given.keys()
     return {name: value for name, value in defaults.items() if name != "max_samples" or not stops} | given
