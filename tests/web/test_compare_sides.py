@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Browser, Locator, Page
 
 from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.editing import finish, overlay
+from tests.web.modules import call
 
 LABELS = ".variant"
 
@@ -171,6 +173,9 @@ def test_a_photograph_is_fitted_by_hand_in_linear_light(editor: Editor) -> None:
     assert np.log2(np.sqrt(warm[0] * warm[2]) / warm[1]) == pytest.approx(1, abs=0.1)
     page.get_by_role("button", name="Neutral").click()
     editor.wait("as it is", lambda: np.abs(middles() - stripes).max() <= 1)
+    for title in ("FLIP", "Verdict"):
+        assert side(editor, "Comparison").locator("option", has_text=title).is_disabled()
+    assert page.get_by_text("neither a verdict nor FLIP").is_visible(), "and why"
 
     editor.drop("#stage", {"other.png": picture([(0, 255, 0)])})
     editor.wait("the other", lambda: "other.png" in editor.text(".variant.b"))
@@ -223,3 +228,81 @@ def test_everybody_can_compare(browser: Browser, server: Server, size: tuple[int
         assert page.get_by_role("button", name="Done").bounding_box()["x"] < size[0] - 30, "the way out is in sight"  # type: ignore[index]
     assert editor.complaints == []
     page.close()
+
+
+def verdict(editor: Editor) -> str:
+    return editor.page.get_by_role("status", name="Verdict").inner_text()
+
+
+def test_the_server_says_whether_two_differ(editor: Editor, server: Server) -> None:
+    page = editor.page
+    finish(editor, 16)
+    page.click("#compare")
+    way(editor, "Verdict")
+    editor.wait("the verdict on a copy", lambda: verdict(editor).startswith("The same within noise"))
+    assert not overlay(editor, "difference").any(), "the pictures are to be seen"
+    page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
+    editor.wait("another B", lambda: verdict(editor).startswith("Something has changed"))
+    page.get_by_role("button", name="Ask again").press("Enter")
+    assert verdict(editor).startswith("Comparing")
+    editor.wait("the verdict", lambda: verdict(editor).startswith("Different: p "))
+    said = page.get_by_role("status", name="Verdict")
+    assert "FLIP" in (said.text_content() or "") and said.get_attribute("aria-live") == "polite"
+    drawn = overlay(editor, "difference")
+    assert 0 < (drawn[..., 3] > 0).mean() < 0.5, "outlines over the pictures"
+    way(editor, "FLIP")
+    editor.wait("the map", lambda: re.match(r"FLIP 0\.\d", verdict(editor)))
+    assert overlay(editor, "difference")[..., :3].max() > 100
+    assert [each for each in editor.complaints if "getImageData" not in each] == [], "but what this test reads"
+
+    # A render is compared at its own size.
+    id = render(server, 48, 32, "The small one")
+    page.reload()
+    asked: list[Any] = []
+    page.on("request", lambda each: asked.append(each.post_data_json) if each.url.endswith("/v1/compare") else None)
+    way(editor, "Verdict")
+    choose(editor, "Right", f"render {id}")
+    editor.wait("the verdict on it", lambda: asked and verdict(editor).startswith(("The same", "Different")))
+    assert asked[-1]["b"] == id
+    assert (asked[-1]["a"]["settings"]["width"], asked[-1]["a"]["settings"]["height"]) == (48, 32)
+
+
+def test_who_edits_or_leaves_ends_the_comparison(editor: Editor) -> None:
+    page = editor.page
+    editor.settled()
+    page.click("#compare")
+    held: list[Any] = []
+    ended: list[str] = []
+    page.route("**/v1/compare*", lambda route: held.append(route))
+    page.on("requestfailed", lambda each: ended.append(each.url))
+    way(editor, "Verdict")
+    editor.wait("the question", lambda: len(held) == 1)
+    assert verdict(editor).startswith("Comparing")
+    page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
+    editor.wait("its end", lambda: len(ended) == 1)
+    assert verdict(editor).startswith("Something has changed") and len(held) == 1, "nobody asked again"
+    page.get_by_role("button", name="Ask again").click()
+    editor.wait("the next", lambda: len(held) == 2)
+    page.get_by_role("button", name="Stop").click()
+    editor.wait("its end", lambda: len(ended) == 2 and verdict(editor) == "Stopped")
+    way(editor, "FLIP")
+    editor.wait("another question", lambda: len(held) == 3)
+    page.click("#comparison >> text=Done")
+    editor.wait("its end", lambda: len(ended) == 3)
+
+
+def test_a_verdict_in_words(page: Page) -> None:
+    size = {"width": 300, "height": 300}
+
+    def words(p_value: float, *boxes: tuple[int, int, int, int]) -> Any:
+        regions = [dict(zip(("x", "y", "width", "height"), box, strict=True)) for box in boxes]
+        answer = {"different": p_value < 1e-3, "p_value": p_value, "regions": regions}
+        return call(page, "compare/verdict.js", "verdictWords", answer, size)
+
+    assert words(0.4) == "The same within noise"
+    assert words(2e-6, (0, 0, 60, 60)) == "Different: p = 2e-6, mostly in the upper left"
+    assert words(2e-6, (20, 240, 200, 40)) == "Different: p = 2e-6, mostly at the bottom"
+    assert words(2e-6, (220, 10, 60, 270)) == "Different: p = 2e-6, mostly at the right"
+    assert words(2e-6, (110, 110, 80, 80)) == "Different: p = 2e-6, mostly in the middle"
+    assert words(2e-6, (0, 0, 60, 60), (240, 240, 60, 60)) == "Different: p = 2e-6", "at no one place"
+    assert words(1e-300, (0, 0, 300, 290)) == "Different: p is practically 0", "everywhere"

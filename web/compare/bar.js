@@ -4,13 +4,11 @@ import { element } from "../lib/dom.js";
 import { browse } from "../lib/files.js";
 import { inWords } from "../lib/format-text.js";
 import { watchChoice } from "../lib/tabs.js";
-import { GAINS, MODES, PHOTO, gainOf, modeOf, sidesOf } from "../document/variants.js";
+import { ASKED, GAINS, MODES, PHOTO, gainOf, modeOf, shows, sidesOf } from "../document/variants.js";
 import { Choices } from "./choices.js";
 import { NEUTRAL } from "./photograph.js";
 
 const PICTURES = ".png,.jpg,.jpeg,.webp,.avif";
-const ASKED = ["flip", "verdict"]; // of the server, which knows nothing of a photograph's noise
-const SERVED = false;
 const WHY_NOT = "A photograph's noise is not known, so there is neither a verdict nor FLIP with one.";
 
 // What is set by hand of a photograph, in stops: [name, title, most to either side, what its ends do].
@@ -37,9 +35,7 @@ export class CompareBar {
     this.modes = select(
       "Comparison",
       (mode) => choose({ mode }),
-      ...Object.entries(MODES)
-        .filter(([mode]) => SERVED || !ASKED.includes(mode))
-        .map(([value, title]) => option(value, title)),
+      ...Object.entries(MODES).map(([value, title]) => option(value, title)),
     );
     this.signs = select(
       "Sign of the difference",
@@ -142,16 +138,16 @@ export class CompareBar {
       this.file,
       ...this.stops.map((each) => each.element),
       button("Neutral", () => setPhoto(NEUTRAL)),
-      SERVED ? element("p", { class: "note" }, WHY_NOT) : null,
+      element("p", { class: "note" }, WHY_NOT),
     );
     return this.photo;
   }
 
-  // `photograph` or null; `isAsking`, `isOutdated` of the server's answer.
-  show(compare, { photograph, isAsking, isOutdated }) {
+  // `photograph` or null; `isAsking`: whether the server is asked.
+  show(compare, { photograph, isAsking }) {
     const names = sidesOf(compare);
     const mode = modeOf(compare);
-    const isPhoto = Object.values(names).includes(PHOTO);
+    const isPhoto = shows(compare, PHOTO);
     this.choices.show(names, photograph?.name ?? "Photograph…");
     this.modes.value = mode;
     for (const each of this.modes.options) each.disabled = isPhoto && ASKED.includes(each.value);
@@ -159,9 +155,9 @@ export class CompareBar {
     this.signs.value = compare.isSigned ? "signed" : "absolute";
     this.gains.hidden = !["difference", "heat"].includes(mode);
     this.gains.value = String(gainOf(compare));
-    this.asks.hidden = !ASKED.includes(mode) || isPhoto || !(isAsking || isOutdated);
+    this.asks.hidden = !ASKED.includes(mode);
     this.asks.textContent = isAsking ? "Stop" : "Ask again";
-    this.variants.hidden = !Object.values(names).includes("b");
+    this.variants.hidden = !shows(compare, "b");
     this.markSide(({ dataset }) => dataset.value === compare.side);
     this.photo.hidden = !isPhoto;
     for (const { name, range, reading } of this.stops) {

@@ -4,17 +4,16 @@
 import { amount } from "../lib/format-text.js";
 import { kindOf } from "../lib/files.js";
 import { element } from "../lib/dom.js";
-import { MODES, PHOTO, compared, gainOf, modeOf, placed, sidesOf } from "../document/variants.js";
+import { ASKED, MODES, PHOTO, compared, gainOf, modeOf, placed, sidesOf } from "../document/variants.js";
 import { CompareBar } from "./bar.js";
 import { sideOf } from "./sides.js";
 import { difference } from "./difference.js";
 import { Photograph } from "./photograph.js";
-import { Question, drawRegions, factsOf, verdictWords } from "./verdict.js";
+import { Question, drawRegions, factsOf, flipWords, verdictWords } from "./verdict.js";
 
 const DIFFERENCE_MS = 250; // between two of them
 const SIDES = ["left", "right"];
 const BETWEEN = ["difference", "heat"]; // shown by one picture, which is made here
-const ASKED = ["flip", "verdict"]; // of the server
 const SPLIT = ["swipe", "verdict"]; // shown as two halves under a bar that moves
 
 const percent = (x) => `${(100 * x).toFixed(2)} %`;
@@ -153,8 +152,7 @@ export class Comparison {
       this.#photograph?.close();
       this.#photograph = photograph;
       this.acts.forgive();
-      const isThere = Object.values(sidesOf(this.#compared)).includes(PHOTO);
-      this.acts.amend(isThere ? {} : placed(this.acts.state, "right", PHOTO));
+      this.acts.amend(this.#open.has(PHOTO) ? {} : placed(this.acts.state, "right", PHOTO));
     } catch (problem) {
       this.acts.complain(problem);
     }
@@ -217,15 +215,11 @@ export class Comparison {
     if (!this.isOn) return;
     this.#label();
     const { question } = this;
-    const isOutdated = !question.isAsking && (!question.answer || question.isOutdated(this.#subjects));
-    this.bar.show(this.#compared, { photograph: this.#photograph, isAsking: question.isAsking, isOutdated });
+    const isOutdated = question.isOutdated(this.#subjects);
+    this.bar.show(this.#compared, { photograph: this.#photograph, isAsking: question.isAsking });
     if (!ASKED.includes(this.#mode)) return;
-    const { map, verdict } = question.answer ?? {};
-    if (map) this.#put(map);
-    if (verdict) {
-      Object.assign(this.difference, { width: this.first.canvas.width, height: this.first.canvas.height });
-      drawRegions(this.difference, verdict.different ? verdict.regions : [], question.size);
-    }
+    if (!question.answer || isOutdated) this.#empty();
+    else this.#draw(question.answer, question.size);
     const [text, beside] = this.#words();
     this.bar.tell(text, beside, true);
   }
@@ -236,16 +230,20 @@ export class Comparison {
     const awaited = this.#awaited();
     if (awaited) return [awaited];
     if (isAsking) return [isFlip ? "Rendering both for FLIP…" : "Comparing, until it is certain…"];
-    if (problem) return [problem.message];
     if (this.question.isOutdated(this.#subjects)) return ["Something has changed since this was asked"];
+    if (problem) return [problem];
     if (!answer) return ["Stopped"];
-    if (isFlip) return ["FLIP: the brighter, the more an eye sees of it"];
-    return [verdictWords(answer.verdict, size), factsOf(answer.verdict)];
+    const { verdict } = answer;
+    return isFlip
+      ? [flipWords(verdict), "the brighter, the more an eye sees of it"]
+      : [verdictWords(verdict, size), factsOf(verdict)];
   }
 
-  #put(image) {
-    Object.assign(this.difference, { width: image.width, height: image.height });
-    this.difference.getContext("2d").drawImage(image, 0, 0);
+  #draw({ verdict, map }, size) {
+    const { width, height } = map ?? this.first.canvas;
+    Object.assign(this.difference, { width, height });
+    if (map) this.difference.getContext("2d").drawImage(map, 0, 0);
+    else drawRegions(this.difference, verdict.different ? verdict.regions : [], size);
   }
 
   // --- what is seen ---

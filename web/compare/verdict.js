@@ -1,10 +1,12 @@
 // What the server finds between two pictures: whether they are the same within noise, and where not; or the map of what
 // an eye would see (FLIP). It takes samples until it is decided, so it is asked for once and not again with every edit.
 
+import { amount } from "../lib/format-text.js";
 import { equal } from "../lib/patch.js";
 import { compare, compareMap } from "../server/api.js";
+import { problemText } from "../server/problem-text.js";
 
-const LEAST = 1e-300; // a p below that is as good as none
+const LEAST = 1e-290; // the server gives no p below about 1e-300: one near that is as good as none
 const TINY = 1e-3; // a p below that is written as a power of ten
 const MOST = 0.6; // of what differs: what "mostly" says
 const WHOLE = 0.5; // of the picture: what differs over more than that is not somewhere
@@ -41,16 +43,19 @@ export function placeOf(regions, { width, height }) {
 export function verdictWords({ different, p_value, regions }, size) {
   if (!different) return "The same within noise";
   const place = placeOf(regions, size);
-  const p = p_value < LEAST ? "p is practically 0" : `p = ${probability(p_value)}`;
+  const p = p_value <= LEAST ? "p is practically 0" : `p = ${probability(p_value)}`;
   return `Different: ${[p, ...(place ? [`mostly ${place}`] : [])].join(", ")}`;
 }
 
+export const flipWords = ({ flip }) => `FLIP ${short(flip)}`;
+
 // What is beside it: how much, in measures that others know.
-export function factsOf({ flip, ssim, psnr }) {
+export function factsOf({ flip, ssim, psnr, samples }) {
   return [
-    `FLIP ${short(flip)}`,
+    flipWords({ flip }),
     `SSIM ${short(ssim)}`,
     ...(psnr === null ? [] : [`PSNR ${psnr.toFixed(1)} dB`]),
+    ...(samples.b ? [`of ${amount(samples.b, "sample")}`] : []),
   ].join(" · ");
 }
 
@@ -71,9 +76,24 @@ export function drawRegions(canvas, regions, size) {
   }
 }
 
+// The settings of a comparison: of the undenoised picture, as nobody knows the noise of another one.
+const sized = ({ scene, settings: { denoise: _, ...settings } }, { width, height }) => ({
+  scene,
+  settings: { ...settings, width, height },
+});
+
+async function answered(kind, a, b, signal) {
+  if (kind === "verdict") return { verdict: await compare(a, b, signal) };
+  const { verdict, blob } = await compareMap(a, b, kind, signal);
+  return { verdict, map: await createImageBitmap(blob) };
+}
+
+const placeWords = (pointer) => ({ "/a": "The left picture", "/b": "The right picture" })[pointer] ?? "";
+
 export class Question {
-  answer = null; // {verdict} or {map}, an image
-  problem = null;
+  answer = null; // {verdict} and, of "flip", {map}
+  problem = ""; // why there is none
+  size = null; // of what was compared
   #about = null; // {kind, subjects, names}
   #asking = null;
 
@@ -86,38 +106,32 @@ export class Question {
     return this.#asking !== null;
   }
 
-  // Whether what was asked was about this.
+  // Whether what was asked last was of this kind, about what has these names.
   isAbout(kind, names) {
     return this.#about?.kind === kind && equal(this.#about.names, names);
   }
 
+  // Whether something has been edited since.
   isOutdated(subjects) {
     return this.#about !== null && !equal(this.#about.subjects, subjects);
   }
 
-  get isAnswered() {
-    return this.answer !== null;
-  }
-
   // `kind`: "verdict" or "flip"; `subjects` of both sides, and the `names` of these.
   async ask(kind, subjects, names, size) {
-    this.stop();
+    this.forget();
     const asking = new AbortController();
-    Object.assign(this, { answer: null, problem: null, size });
-    this.#about = { kind, subjects, names };
     this.#asking = asking;
+    this.#about = { kind, subjects, names };
+    this.size = size;
     this.changed();
     const [a, b] = subjects.map((subject) => (typeof subject === "string" ? subject : sized(subject, size)));
     try {
-      const answer =
-        kind === "verdict"
-          ? { verdict: await compare(a, b, asking.signal) }
-          : { map: await createImageBitmap(await compareMap(a, b, "flip", asking.signal)) };
+      const answer = await answered(kind, a, b, asking.signal);
       if (asking.signal.aborted) return;
       this.answer = answer;
     } catch (problem) {
       if (asking.signal.aborted) return;
-      this.problem = problem;
+      this.problem = problemText(problem, {}, placeWords);
     }
     this.#asking = null;
     this.changed();
@@ -131,8 +145,7 @@ export class Question {
 
   forget() {
     this.stop();
-    this.#about = this.answer = this.problem = null;
+    this.#about = this.answer = null;
+    this.problem = "";
   }
 }
-
-const sized = ({ scene, settings }, { width, height }) => ({ scene, settings: { ...settings, width, height } });

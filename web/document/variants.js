@@ -14,6 +14,8 @@ export const MODES = {
 export const GAINS = [1, 2, 4, 8, 16, 64];
 export const USUAL_GAIN = 4; // an eighth of the range is seen as half of it
 
+export const ASKED = ["flip", "verdict"]; // of the server, which knows nothing of a photograph's noise
+
 export const PHOTO = "photo";
 export const SNAPSHOT = "snapshot "; // followed by its time, as the browser's storage names it
 export const RENDER = "render "; // followed by its id
@@ -22,10 +24,11 @@ export const RENDER = "render "; // followed by its id
 export const compared = ({ compare, scene }) =>
   compare && !compare.closed && compare.material in scene.materials ? compare : null;
 
-export const modeOf = ({ mode }) => (mode in MODES ? mode : "swipe");
 export const gainOf = ({ gain }) => (GAINS.includes(gain) ? gain : USUAL_GAIN);
 export const sidesOf = ({ left = "a", right = "b" }) => ({ left, right });
-const shows = (compare, name) => Object.values(sidesOf(compare)).includes(name);
+export const shows = (compare, name) => Object.values(sidesOf(compare)).includes(name);
+export const modeOf = (compare) =>
+  compare.mode in MODES && !(ASKED.includes(compare.mode) && shows(compare, PHOTO)) ? compare.mode : "swipe";
 
 // The same, or null where B is at neither side.
 export function comparedB(state) {

@@ -101,12 +101,15 @@ export async function renderImage(id, query, { progress = () => {}, signal } = {
 // Cancels one that has not ended; its picture so far stays. Deletes one that has.
 export const deleteRender = (id, options) => ask("DELETE", `renders/${id}`, options);
 
-// What lies between two pictures, each {scene, settings} or the id of a render. More samples are taken while that is
-// undecided; `signal` ends it.
+// What lies between two pictures, each {scene, settings} or the id of a render: {different, p_value, regions, ...}. More
+// samples are taken while that is undecided; `signal` ends it.
 export const compare = async (a, b, signal) => (await ask("POST", "compare", { ...json({ a, b }), signal })).json();
-// The same as a picture: its "flip" or what else the server maps.
-export const compareMap = async (a, b, map, signal) =>
-  (await ask("POST", `compare?${new URLSearchParams({ format: "png", map })}`, { ...json({ a, b }), signal })).blob();
+// The same beside a picture of it, of its "flip" or what else the server maps: {verdict, blob}.
+export async function compareMap(a, b, map, signal) {
+  const query = new URLSearchParams({ format: "png", map });
+  const response = await ask("POST", `compare?${query}`, { ...json({ a, b }), signal });
+  return { verdict: JSON.parse(response.headers.get("sunbox-verdict")), blob: await response.blob() };
+}
 
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
 
