@@ -198,6 +198,23 @@ def test_a_slider_changes_the_material(shown: Notebook) -> None:
     assert value > before
 
 
+def test_a_number_is_written_and_what_is_refused_is_said_there(shown: Notebook) -> None:
+    number = shown.view(0).get_by_label("Roughness, number", exact=True)
+    trouble = shown.view(0).locator(".field .trouble:visible")
+    number.fill("0.35")
+    number.press("Enter")
+    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.35)
+    number.fill("7")
+    number.press("Enter")
+    trouble.wait_for()
+    assert "not 7" in trouble.inner_text()
+    assert shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.35
+    number.fill("0.5")
+    number.press("Enter")
+    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.5)
+    assert trouble.count() == 0
+
+
 def test_python_changes_the_picture_and_the_form(shown: Notebook) -> None:
     before = shown.pixels(0)
     shown.run(3)

@@ -107,6 +107,10 @@ function view({ model, el }) {
       class: "sunbox-view",
       // JupyterLab's keys are for its cells: it looks at the element that has the focus.
       onfocusin: ({ target }) => target.setAttribute("data-lm-suppress-shortcuts", "true"),
+      // Nor does Enter reach what a browser does with it.
+      onkeydown: ({ key, target }) => {
+        if (key === "Enter" && target.type === "text") target.dispatchEvent(new Event("change"));
+      },
     },
     element("div", { class: "shown" }, canvas.element, element("div", { class: "line" }, samples, status)),
   );

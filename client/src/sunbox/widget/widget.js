@@ -1449,6 +1449,9 @@ const root=element(
 {
 class: "sunbox-view",
 onfocusin: ({ target }) => target.setAttribute("data-lm-suppress-shortcuts", "true"),
+onkeydown:({key,target})=>{
+if (key === "Enter" && target.type === "text") target.dispatchEvent(new Event("change"));
+},
 },
 element("div", { class: "shown" }, canvas.element, element("div", { class: "line" }, samples, status)),
 );
