@@ -7,7 +7,6 @@ import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { lampShape, standOf, subjectOf } from "./document/lamps.js";
 import { ballOf, solids, union, wayOut } from "./document/placing.js";
-import { staged } from "./document/stage.js";
 import { moved } from "./document/transforms.js";
 import { add, cross, normalize, scale, turn } from "./lib/vector.js";
 
@@ -49,6 +48,7 @@ export class Adder {
   async stage(kind) {
     const boxes = await this.controller.boxes();
     try {
+      const { staged } = await import("./document/stage.js");
       this.acts.change(await staged(this.acts, boxes, kind));
     } catch (problem) {
       this.acts.complain(problem);

@@ -12,7 +12,6 @@ import { fileValueWords, problemText, warningText } from "./server/problem-text.
 import { readRecipe } from "./document/recipe.js";
 import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
-import { grounded } from "./document/stage.js";
 import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
 import { collected, placed, thingFor } from "./texture-set.js";
@@ -186,13 +185,19 @@ export class Importer {
     if (way === "add") return this.#addScene(document, file, { bounds, warnings });
     const whole = bounds && { low: bounds[0], high: bounds[1] };
     if (whole) remember(document.shapes, whole);
-    const standing = whole ? grounded(document, whole, this.acts.plainMaterial) : document;
+    const standing = whole ? await this.#grounded(document, whole) : document;
     this.acts.openScene(standing, stem(file), exposure);
     const taken =
       exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
     const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", isUnderNoSky(document) ? studioToo : null);
     return true;
+  }
+
+  // On a ground, where the model brings none.
+  async #grounded(document, around) {
+    const { grounded } = await import("./document/stage.js");
+    return grounded(document, around, this.acts.plainMaterial);
   }
 
   // What a file says of its lights and cameras does not matter where these stay behind.
@@ -227,8 +232,7 @@ export class Importer {
     measure(id, bounds);
     const isOpened = way === "open";
     const whole = { low: bounds[0], high: bounds[1] };
-    const alone = async () => grounded(await this.#alone(id, stem(file)), whole, this.acts.plainMaterial);
-    if (isOpened) this.acts.openScene(await alone(), stem(file));
+    if (isOpened) this.acts.openScene(await this.#grounded(await this.#alone(id, stem(file)), whole), stem(file));
     else await this.adder.addMesh(id, stem(file));
     this.#tell(file, warnings, "taken as it is.");
     return isOpened;

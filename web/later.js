@@ -144,7 +144,7 @@ export function laterParts({
     { complain, arrived: (made) => page.info && made.show() },
   );
 
-  const all = [textures, adder, importer, menus, stage, finals, controller.tools];
+  const all = [textures, adder, importer, menus, finals, controller.tools];
   return {
     comparison,
     textures,

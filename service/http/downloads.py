@@ -100,6 +100,11 @@ class Written:
         self.file = file
         self.bytes = os.fstat(file.fileno()).st_size
 
+    @property
+    def is_modest(self) -> bool:
+        """Whether as many as stay would leave room for others."""
+        return self.bytes <= ROOM // (2 * LASTING)
+
 
 class Downloads:
     """Pictures that are written and sent, for the event loop."""

@@ -275,7 +275,7 @@ async def picture_file(
             downloads.admit(caller, _most_bytes(job, query))
             with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
                 written = await _written(downloads, job, query)
-            downloads.keep(caller, key, written)
+            downloads.keep(caller, key, written, lasting=key is not None and query.aov == "all" and written.is_modest)
     return written
 
 

@@ -47,6 +47,13 @@ def order(editor: Editor, samples: int, width: int = 64, height: int = 48) -> Lo
     return renders(editor).first
 
 
+def expose(editor: Editor, stops: float) -> None:
+    editor.tab("film")
+    entry = editor.page.locator("#view-form [data-field=exposure] input.number")
+    entry.fill(str(stops))
+    entry.press("Enter")
+
+
 def is_done(item: Locator) -> Callable[[], bool]:
     return lambda: item.get_attribute("data-state") == "done"
 
@@ -65,9 +72,12 @@ def test_a_picture_is_rendered_in_any_size_and_saved(editor: Editor) -> None:
     page = editor.page
     editor.tab("render")
     assert size(editor) == [1920, 1080], "unless somebody says otherwise"
+    ratio = "picture.width / picture.height"
+    editor.wait("what will be in it", lambda: page.evaluate(ratio) == pytest.approx(16 / 9, 0.02))
     picker = page.get_by_label("Size", exact=True)
     picker.select_option("As the window")
-    assert size(editor) == page.evaluate("[picture.width, picture.height]")
+    editor.wait("its size", lambda: size(editor) == page.evaluate("[picture.width, picture.height]"))
+    assert page.evaluate(ratio) == pytest.approx(page.evaluate("stage.clientWidth / stage.clientHeight"), 0.02)
     picker.select_option("HD, 1920 × 1080".replace(" × ", "\u202f×\u202f"))
     assert page.get_by_role("button", name="Render 1920×1080", exact=True).is_visible()
     assert "1920 × 1080, Clean in about" in plain(str(page.get_attribute("#render", "title")))
@@ -137,8 +147,15 @@ def test_a_render_that_is_refused_says_why_at_its_field(editor: Editor) -> None:
 
 def test_a_file_in_the_making_says_so_and_blocks_nothing(editor: Editor) -> None:
     page = editor.page
-    item = order(editor, 2)
-    editor.wait("the end", is_done(item))
+    expose(editor, -2)
+    with page.expect_response(re.compile(r"format=exr")) as made:  # before anybody asks for it
+        item = order(editor, 2)
+        editor.wait("the end", is_done(item))
+    assert made.value.ok
+    expose(editor, 1)
+    editor.tab("render")
+    recipe = read_metadata(download(editor, item, "Download PNG")[1])
+    assert recipe is not None and recipe["view"]["exposure"] == -2, "as it was seen when it was asked for"
     held: list[Any] = []
     page.route(re.compile(r"format=exr"), lambda route: held.append(route))
     with page.expect_download() as waiting:

@@ -5,7 +5,7 @@ import { visible } from "./outline.js";
 import { compared, rendered } from "./variants.js";
 import { inWords } from "../lib/format-text.js";
 import { defaults } from "../server/schema.js";
-import { DISPLAY, contained, pictureSize, viewOf } from "./picture-view.js";
+import { DISPLAY, FINAL, contained, pictureSize, viewOf } from "./picture-view.js";
 
 // Pixels that a renderer traces fast enough to follow the hand.
 const AREA = { software: 512 * 512, hardware: 1920 * 1080 };
@@ -57,15 +57,37 @@ export class PageState {
     return this.ui.state.checker ?? this.editor.state.scene.environment?.background === false;
   }
 
-  // The pixels of the picture on the page.
+  // The pixels of the picture on the page. While a final picture is prepared it has that one's shape, so that what will be
+  // in it is seen.
   get size() {
+    return this.#in(this.#chosenShape ?? (this.ui.state.tab === "render" ? FINAL : null));
+  }
+
+  // What it would be if it filled its place, where no shape was chosen.
+  get windowSize() {
+    return this.#in(this.#chosenShape);
+  }
+
+  // The sides that were chosen, or null.
+  get #chosenShape() {
+    const { width, height } = this.editor.state.settings;
+    return width && height ? { width, height } : null;
+  }
+
+  // The pixels in a shape, or in the whole window, whose own sides are not rounded again.
+  #in(shape) {
+    const whole = this.#sizeOf(null);
+    const isWhole = !shape || (shape.width === whole.width && shape.height === whole.height);
+    return isWhole ? whole : this.#sizeOf(shape);
+  }
+
+  #sizeOf(shape) {
     const area = Math.min(
       this.info.renderer?.software === false ? AREA.hardware : AREA.software,
       this.info.limits.max_pixels,
     );
-    const { width, height } = this.editor.state.settings;
     const stageBox = this.root.getBoundingClientRect();
-    const box = width && height ? contained(stageBox, { width, height }) : stageBox;
+    const box = shape ? contained(stageBox, shape) : stageBox;
     // Those that are rendered at a time share what one may cost.
     return pictureSize(this.fit(box), window.devicePixelRatio, area / rendered(this.editor.state));
   }

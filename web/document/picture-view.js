@@ -8,6 +8,9 @@ const PAINTED = ["depth", "variance", "shape_id", "material_id"];
 
 export const isPainted = (aov) => PAINTED.includes(aov);
 
+// The sides of a final picture, unless somebody says otherwise.
+export const FINAL = { width: 1920, height: 1080 };
+
 // Of the box, the largest part with these sides' proportions.
 export function contained(box, { width, height }) {
   const zoom = Math.min(box.width / width, box.height / height);

@@ -1,7 +1,7 @@
 // The files that a render is taken along as. Making one may take the server a while: layers are traced when they are
 // first asked for. What is being made is said beside the render meanwhile.
 
-import { renderImage } from "../server/api.js";
+import { prepareImage, renderImage } from "../server/api.js";
 import { saveAs } from "../lib/files.js";
 import { duration } from "../lib/format-text.js";
 import { pictureFile } from "../document/file-name.js";
@@ -34,6 +34,11 @@ export class RenderFiles {
   // The sentences about the files of a render that are being made.
   words(id) {
     return [...this.#making].filter(([key]) => key.startsWith(`${id} `)).map(([, text]) => text);
+  }
+
+  // Has the server make a file before it is asked for. What goes wrong is said then.
+  prepare(render, format) {
+    prepareImage(render.id, { ...FORMATS[format].query, ...this.view(render) }).catch(() => {});
   }
 
   #tell(key, text) {

@@ -8,6 +8,7 @@ import { RenderPictures } from "./pictures.js";
 import { Renders } from "./renders.js";
 import { RenderSheet } from "./sheet.js";
 import { openRender } from "./viewer.js";
+import { RenderViews } from "./views.js";
 import { titleOf } from "./words.js";
 
 const FURTHER = ["png-16", "webp", "avif"]; // formats beside PNG and EXR, which have buttons of their own
@@ -21,12 +22,14 @@ export class FinalPictures {
 
   constructor({ find, schema, page, editor, ui, messages, recipes, title, compareWith, complain, say }) {
     Object.assign(this, { page, editor, ui, messages, recipes, title, complain, say });
-    const view = () => page.view;
+    this.views = new RenderViews();
+    const view = (render) => this.views.of(render?.id) ?? page.view;
     this.renders = new Renders({
       changed: () => this.#show(),
       ended: (render) => this.#ended(render),
       forgotten: (ids) => {
         this.pictures.forget(ids);
+        this.views.forget(ids);
         messages.hide("deleted"); // it cannot be taken back any more
       },
     });
@@ -67,7 +70,7 @@ export class FinalPictures {
   show() {
     const { settings } = this.editor.state;
     const { quality: presets, limits } = this.page.info;
-    const screen = this.page.size;
+    const screen = this.page.windowSize;
     this.sheet.show(settings, { screen, presets, limits, live: this.page.header });
     this.#list();
   }
@@ -92,6 +95,7 @@ export class FinalPictures {
     if (this.#isListed || !this.page.isConnected || !this.lists.some(({ isShown }) => isShown)) return;
     this.#isListed = true;
     await this.#try(async () => {
+      await this.views.load();
       await this.renders.refresh();
       if (!this.renders.hasMore) await this.pictures.keepOnly(this.renders.entries.map(({ id }) => id));
     });
@@ -100,7 +104,9 @@ export class FinalPictures {
   async #start(size) {
     const { scene, settings, chosen } = this.editor.state;
     const label = this.title().slice(0, LONGEST_LABEL);
-    await this.renders.submit({ scene: visible(scene, chosen.hidden), settings: { ...settings, ...size }, label });
+    const { view } = this.page;
+    const order = { scene: visible(scene, chosen.hidden), settings: { ...settings, ...size }, label };
+    await this.renders.submit(order, ({ id }) => this.views.keep(id, view));
     this.say("The render waits for its turn");
   }
 
@@ -109,6 +115,8 @@ export class FinalPictures {
   }
 
   #ended(render) {
+    // The layers of its EXR are traced now, so that they are there when somebody wants them.
+    if (render.state === "done") this.files.prepare(render, "exr");
     const text = { done: "is rendered", cancelled: "is stopped", failed: "could not be rendered" }[render.state];
     if (this.lists.some(({ isShown }) => isShown)) this.say(`${titleOf(render)} ${text}`);
     else {

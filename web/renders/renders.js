@@ -57,9 +57,11 @@ export class Renders {
     this.#show([...this.entries, ...renders]);
   }
 
-  // Starts a render; raises what the server refused. `order`: {scene, settings, label, ...}.
-  async submit(order) {
+  // Starts a render; raises what the server refused. `order`: {scene, settings, label, ...}; `accepted(status)` is called
+  // before it is listed.
+  async submit(order, accepted) {
     const status = await api.submitRender(order, freshKey());
+    accepted(status);
     this.#turn += 1;
     this.#show([status, ...this.entries.filter(({ id }) => id !== status.id)]);
   }

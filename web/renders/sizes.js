@@ -1,10 +1,12 @@
 // The sizes of a picture that have names, and shapes that keep their proportions.
 
+import { FINAL } from "../document/picture-view.js";
+
 export const WINDOW = "window";
 export const CUSTOM = "custom";
 
 export const SIZES = {
-  hd: { title: "HD", width: 1920, height: 1080 },
+  hd: { title: "HD", ...FINAL },
   "4k": { title: "4K", width: 3840, height: 2160 },
   square: { title: "Square", width: 1080, height: 1080 },
   story: { title: "Story", width: 1080, height: 1920 },

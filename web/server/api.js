@@ -98,6 +98,11 @@ export async function renderImage(id, query, { progress = () => {}, signal } = {
   }
   return new Blob(parts, { type: response.headers.get("content-type") });
 }
+// Resolves once the server has made that file, which is not fetched yet.
+export const prepareImage = async (id, query) => {
+  const response = await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`);
+  await response.body.cancel();
+};
 // Cancels one that has not ended; its picture so far stays. Deletes one that has.
 export const deleteRender = (id, options) => ask("DELETE", `renders/${id}`, options);
 

@@ -10,7 +10,6 @@ errors           the exceptions
 files            the files that a scene names, and arrays in it
 frames           a frame of a stream
 lobes            what a BSDF answers, as arrays
-verdicts         whether two pictures differ beyond noise
 merge            merge patches (RFC 7386)
 progress         a line while a render goes on
 view             View: a live picture in a notebook
@@ -43,7 +42,6 @@ if TYPE_CHECKING:
     from sunbox.frames import Frame
     from sunbox.lobes import Albedo, Bsdf, SpecularLobe
     from sunbox.local import render
-    from sunbox.verdicts import Region, Verdict
     from sunbox.view import View
 
 _PLACES = {
@@ -56,7 +54,6 @@ _PLACES = {
     "frames": ("Frame",),
     "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
     "local": ("render",),
-    "verdicts": ("Region", "Verdict"),
     "view": ("View",),
 }
 _MODULE = {name: module for module, names in _PLACES.items() for name in names}
@@ -77,12 +74,10 @@ __all__ = [
     "NotFound",
     "Picture",
     "Refused",
-    "Region",
     "SpecularLobe",
     "Stream",
     "SunboxError",
     "Unreachable",
-    "Verdict",
     "View",
     "render",
 ]

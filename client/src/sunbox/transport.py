@@ -50,22 +50,13 @@ class Transport:
         return answer.json() if answer.content else None
 
     async def request(
-        self,
-        method: str,
-        path: str,
-        data: bytes | None = None,
-        headers: Mapping[str, str] | None = None,
-        patient: bool = False,
+        self, method: str, path: str, data: bytes | None = None, headers: Mapping[str, str] | None = None
     ) -> httpx2.Response:
-        """A request that may be sent twice: every one that this package makes. `patient`: its answer may take as long
-        as it takes. Raises SunboxError."""
-        timeout = httpx2.Timeout(self.timeout, read=None) if patient else httpx2.Timeout(self.timeout)
+        """A request that may be sent twice: every one that this package makes. Raises SunboxError."""
         for attempt in range(self.retries + 1):
             is_last = attempt == self.retries
             try:
-                answer = await self._http.request(
-                    method, self.url + path, content=data, headers=headers, timeout=timeout
-                )
+                answer = await self._http.request(method, self.url + path, content=data, headers=headers)
             except httpx2.TransportError as error:
                 if is_last or (not self._has_answered and attempt == FIRST_CONTACT):
                     raise self._unreachable(error) from None
