@@ -1,6 +1,6 @@
 // What the header's buttons open: the scene's menu, what can be exported, a link; and the pill's readings.
 
-import { amount } from "./lib/format-text.js";
+import { amount, inWords } from "./lib/format-text.js";
 import { watchMenu } from "./lib/menu.js";
 import { essence, linkTo, revived } from "./document/share.js";
 import { WhenClean } from "./panels/when-clean.js";
@@ -49,6 +49,11 @@ export function makeHeader({
     isWanted: () => whenClean.isWanted(),
     scene: () => editor.state.scene,
     material: () => editor.materialSet,
+    link: () => linkTo(editor.state),
+    made() {
+      const { chosen } = editor.state;
+      return [chosen.material, inWords(editor.material.type)].join(", ");
+    },
     png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
     exr: () => exporting.exr(stream, page.layers, recipes.madeFrom),
     command: () =>

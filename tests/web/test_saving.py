@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
+import pytest
 from PIL import Image
 from playwright.sync_api import BrowserContext
 
@@ -305,3 +306,17 @@ def test_the_last_thing_cannot_be_deleted(editor: Editor) -> None:
     editor.page.click("#outline-list [data-thing='/shapes/0']")
     acts.get_by_text("Delete").click()
     assert things.count() == 3 and acts.inner_text().split() == ["Frame", "Duplicate"]
+
+
+def test_a_picture_is_shared_over_a_strip_that_says_what_it_is(editor: Editor) -> None:
+    editor.settled()
+    editor.page.click("#export")
+    image = Image.open(io.BytesIO(editor.shot("#share-picture"))).convert("RGB")
+    tall, wide = editor.page.evaluate("[picture.height, picture.width]")
+    below = image.width * tall / wide
+    assert image.width >= 1080 and image.height == pytest.approx(below + 0.13 * image.width, abs=2)
+    strip = np.asarray(image.crop((0, int(below) + 2, image.width, image.height)), float).mean(axis=2)
+    rows = (strip > 120).sum(axis=1) > 8
+    assert 2 <= (np.diff(rows.astype(int)) == 1).sum() <= 4, "lines of light letters"
+    assert np.median(strip) < 40, "on a dark ground"
+    assert "The link" in editor.text("#messages")

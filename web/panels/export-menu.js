@@ -6,7 +6,7 @@ import { jsonBlob, saveAs } from "../lib/files.js";
 
 export class ExportMenu {
   // `acts`: title() of the scene, scene(), material(), png(bits) and exr() -> {blob, header}, isWanted() resolves to
-  // whether the PNG is to be saved, command(), complain(error), announce(text).
+  // whether the PNG is to be saved, link() to the page as it is, made() in words of what, command(), complain(error), announce(text).
   constructor(root, acts) {
     this.acts = acts;
     const picture = (make, ending) => () =>
@@ -21,6 +21,7 @@ export class ExportMenu {
       ["PNG", "8 bit, as it is on screen", "download", this.png],
       ["PNG, 16 bit", "", "download-16", picture(() => acts.png(16), "png")],
       ["EXR", "all layers, linear", "download-exr", picture(() => acts.exr(), "exr")],
+      ["Share picture", "with name, material and link", "share-picture", () => this.#try(() => this.#share())],
       null,
       ["JSON, scene", "", "download-scene", json("scene")],
       ["JSON, material", "", "download-material", json("material")],
@@ -47,6 +48,21 @@ export class ExportMenu {
     } catch (error) {
       this.acts.complain(error);
     }
+  }
+
+  // The picture with a caption, to the device's other programs or as a file.
+  async #share() {
+    if (!(await this.acts.isWanted())) return;
+    const { captioned, offered } = await import("../picture/shared-picture.js");
+    const [{ blob, header }, url] = [await this.acts.png(8), await this.acts.link()];
+    const title = this.acts.title();
+    const { host, pathname } = new URL(url);
+    const picture = await captioned(blob, { title, note: this.acts.made(), link: `${host}${pathname}` });
+    const name = pictureFile(title, header, "png");
+    const file = new File([picture], name, { type: "image/png" });
+    if (await offered(file, { title, url })) return;
+    saveAs(picture, name);
+    await handOut(url, "The picture is saved. The link", this.acts);
   }
 
   #command() {
