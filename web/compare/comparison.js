@@ -9,7 +9,7 @@ import { CompareBar } from "./bar.js";
 import { sideOf } from "./sides.js";
 import { difference } from "./difference.js";
 import { Photograph } from "./photograph.js";
-import { Question, drawRegions, factsOf, flipWords, verdictWords } from "./verdict.js";
+import { Question, factsOf, flipWords, verdictWords } from "./verdict.js";
 
 const DIFFERENCE_MS = 250; // between two of them
 const SIDES = ["left", "right"];
@@ -219,13 +219,13 @@ export class Comparison {
     this.bar.show(this.#compared, { photograph: this.#photograph, isAsking: question.isAsking });
     if (!ASKED.includes(this.#mode)) return;
     if (!question.answer || isOutdated) this.#empty();
-    else this.#draw(question.answer, question.size);
+    else this.#draw(question.answer);
     const [text, beside] = this.#words();
     this.bar.tell(text, beside, true);
   }
 
   #words() {
-    const { answer, problem, isAsking, size } = this.question;
+    const { answer, problem, isAsking } = this.question;
     const isFlip = this.#mode === "flip";
     const awaited = this.#awaited();
     if (awaited) return [awaited];
@@ -233,17 +233,18 @@ export class Comparison {
     if (this.question.isOutdated(this.#subjects)) return ["Something has changed since this was asked"];
     if (problem) return [problem];
     if (!answer) return ["Stopped"];
-    const { verdict } = answer;
+    const { verdict, place } = answer;
     return isFlip
       ? [flipWords(verdict), "the brighter, the more an eye sees of it"]
-      : [verdictWords(verdict, size), factsOf(verdict)];
+      : [verdictWords(verdict, place), factsOf(verdict)];
   }
 
-  #draw({ verdict, map }, size) {
-    const { width, height } = map ?? this.first.canvas;
-    Object.assign(this.difference, { width, height });
-    if (map) this.difference.getContext("2d").drawImage(map, 0, 0);
-    else drawRegions(this.difference, verdict.different ? verdict.regions : [], size);
+  // As high as the frame, as the pictures under it are; the map of FLIP is a picture of its own.
+  #draw({ image }) {
+    const frame = this.#mode === "flip" ? image : this.first.canvas;
+    const shape = { width: (image.height * frame.width) / frame.height, height: image.height };
+    Object.assign(this.difference, { width: Math.round(shape.width), height: shape.height });
+    this.difference.getContext("2d").putImageData(image, (this.difference.width - image.width) / 2, 0);
   }
 
   // --- what is seen ---

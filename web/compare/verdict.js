@@ -3,13 +3,14 @@
 
 import { amount } from "../lib/format-text.js";
 import { equal } from "../lib/patch.js";
-import { compare, compareMap } from "../server/api.js";
+import { compareMap } from "../server/api.js";
 import { problemText } from "../server/problem-text.js";
 
 const LEAST = 1e-290; // the server gives no p below about 1e-300: one near that is as good as none
 const TINY = 1e-3; // a p below that is written as a power of ten
 const MOST = 0.6; // of what differs: what "mostly" says
 const WHOLE = 0.5; // of the picture: what differs over more than that is not somewhere
+const VEIL = 150; // of 255: how opaque the map lies over the pictures
 
 const ROWS = ["upper", null, "lower"];
 const COLUMNS = ["left", null, "right"];
@@ -18,20 +19,19 @@ const ALONE = { upper: "at the top", lower: "at the bottom", left: "at the left"
 const short = (value) => String(Number(value.toPrecision(2)));
 const probability = (p) => (p < TINY ? p.toExponential(0) : short(p));
 
-// How much of [from, to) lies in each third of 0..1.
-const thirds = (from, to) => [0, 1, 2].map((i) => Math.max(0, Math.min(to, (i + 1) / 3) - Math.max(from, i / 3)));
-
-// "in the upper left": where most of the differing regions is; null where that is all over the picture.
-export function placeOf(regions, { width, height }) {
+// "in the upper left": where most of the pixels lie that are known to differ, those of a map that are not black; null
+// where they are all over the picture.
+export function placeOf({ data, width, height }) {
   const rows = [0, 0, 0];
   const columns = [0, 0, 0];
-  for (const region of regions) {
-    const [across, down] = [region.width / width, region.height / height];
-    thirds(region.y / height, region.y / height + down).forEach((part, i) => (rows[i] += part * across));
-    thirds(region.x / width, region.x / width + across).forEach((part, i) => (columns[i] += part * down));
+  let area = 0;
+  for (let i = 0; i < width * height; i += 1) {
+    if (!isKnown(data, 4 * i)) continue;
+    area += 1;
+    rows[Math.floor((3 * Math.floor(i / width)) / height)] += 1;
+    columns[Math.floor((3 * (i % width)) / width)] += 1;
   }
-  const area = rows.reduce((sum, part) => sum + part, 0);
-  if (!area || area > WHOLE) return null;
+  if (!area || area > WHOLE * width * height) return null;
   const most = (parts) => parts.findIndex((part) => part > MOST * area);
   const [row, column] = [most(rows), most(columns)];
   if (row === 1 && column === 1) return "in the middle";
@@ -39,10 +39,11 @@ export function placeOf(regions, { width, height }) {
   return words.length === 2 ? `in the ${words.join(" ")}` : (ALONE[words[0]] ?? null);
 }
 
-// The answer as a sentence.
-export function verdictWords({ different, p_value, regions }, size) {
+const isKnown = (data, i) => data[i] + data[i + 1] + data[i + 2] > 0;
+
+// The answer as a sentence; `place` as placeOf has it.
+export function verdictWords({ different, p_value }, place) {
   if (!different) return "The same within noise";
-  const place = placeOf(regions, size);
   const p = p_value <= LEAST ? "p is practically 0" : `p = ${probability(p_value)}`;
   return `Different: ${[p, ...(place ? [`mostly ${place}`] : [])].join(", ")}`;
 }
@@ -59,21 +60,11 @@ export function factsOf({ flip, ssim, psnr, samples }) {
   ].join(" · ");
 }
 
-// Draws the outlines of regions of a picture of `size` over one that is as high as the canvas.
-export function drawRegions(canvas, regions, size) {
-  const context = canvas.getContext("2d");
-  const zoom = canvas.height / size.height;
-  const left = (canvas.width - size.width * zoom) / 2;
-  context.clearRect(0, 0, canvas.width, canvas.height);
-  for (const [style, line] of [
-    ["#000", 4],
-    ["#fff", 2],
-  ]) {
-    context.strokeStyle = style;
-    context.lineWidth = line;
-    for (const { x, y, width, height } of regions)
-      context.strokeRect(left + x * zoom, y * zoom, width * zoom, height * zoom);
-  }
+// Makes a map's black clear, and the rest such that the pictures are seen through it.
+function veiled(image) {
+  const { data } = image;
+  for (let i = 0; i < data.length; i += 4) data[i + 3] = isKnown(data, i) ? VEIL : 0;
+  return image;
 }
 
 // The settings of a comparison: of the undenoised picture, as nobody knows the noise of another one.
@@ -82,18 +73,23 @@ const sized = ({ scene, settings: { denoise: _, ...settings } }, { width, height
   settings: { ...settings, width, height },
 });
 
+// {verdict, image, place}: a map of certainty for a verdict, else of what an eye sees.
 async function answered(kind, a, b, signal) {
-  if (kind === "verdict") return { verdict: await compare(a, b, signal) };
-  const { verdict, blob } = await compareMap(a, b, kind, signal);
-  return { verdict, map: await createImageBitmap(blob) };
+  const { verdict, blob } = await compareMap(a, b, kind === "verdict" ? "p" : kind, signal);
+  const bitmap = await createImageBitmap(blob);
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  const image = context.getImageData(0, 0, context.canvas.width, context.canvas.height);
+  if (kind !== "verdict") return { verdict, image };
+  return { verdict, place: placeOf(image), image: veiled(image) };
 }
 
 const placeWords = (pointer) => ({ "/a": "The left picture", "/b": "The right picture" })[pointer] ?? "";
 
 export class Question {
-  answer = null; // {verdict} and, of "flip", {map}
+  answer = null; // {verdict, image, place}
   problem = ""; // why there is none
-  size = null; // of what was compared
   #about = null; // {kind, subjects, names}
   #asking = null;
 
@@ -122,7 +118,6 @@ export class Question {
     const asking = new AbortController();
     this.#asking = asking;
     this.#about = { kind, subjects, names };
-    this.size = size;
     this.changed();
     const [a, b] = subjects.map((subject) => (typeof subject === "string" ? subject : sized(subject, size)));
     try {

@@ -106,10 +106,8 @@ export const prepareImage = async (id, query) => {
 // Cancels one that has not ended; its picture so far stays. Deletes one that has.
 export const deleteRender = (id, options) => ask("DELETE", `renders/${id}`, options);
 
-// What lies between two pictures, each {scene, settings} or the id of a render: {different, p_value, regions, ...}. More
-// samples are taken while that is undecided; `signal` ends it.
-export const compare = async (a, b, signal) => (await ask("POST", "compare", { ...json({ a, b }), signal })).json();
-// The same beside a picture of it, of its "flip" or what else the server maps: {verdict, blob}.
+// What lies between two pictures, each {scene, settings} or the id of a render: {verdict, blob}, the latter a map of "p",
+// "flip" or what else the server draws. More samples are taken while it is undecided; `signal` ends that.
 export async function compareMap(a, b, map, signal) {
   const query = new URLSearchParams({ format: "png", map });
   const response = await ask("POST", `compare?${query}`, { ...json({ a, b }), signal });
