@@ -175,7 +175,7 @@ class Callbacks:
         now, attempts = time.time(), callback.attempts + 1
         more = attempts <= len(PAUSES) and answer != GONE
         known = replace(callback, attempts=attempts, answer=answer, error=error, next_at=None)
-        fields = {"host": callback.host, "id": callback.id, "attempts": attempts}
+        fields: dict[str, object] = {"host": callback.host, "id": callback.id, "attempts": attempts}
         if error is not None and more:
             self.outcomes["retried"] += 1
             pause = PAUSES[attempts - 1] * random.uniform(1 - SCATTER, 1 + SCATTER)
@@ -186,7 +186,8 @@ class Callbacks:
             log.debug("delivered a callback", fields)
             return replace(known, state="delivered", ended_at=now)
         self.outcomes["failed"] += 1
-        log.warning("gave up a callback", fields | {"error": error})
+        fields["error"] = error
+        log.warning("gave up a callback", fields)
         return replace(known, state="failed", ended_at=now)
 
     async def _end(self, callback: Callback, error: ServiceError) -> None:
