@@ -1,9 +1,10 @@
 """Whether two pictures differ beyond noise: tests that need no knowledge of how noise is distributed.
 
 Where a and b have the same expectation, each of many small differences d_i is as likely positive as negative. Then,
-whatever their sizes, S = sum d_i over V, V^2 = sum d_i^2, has tails below those of a normal variable:
+whatever their sizes, S = sum d_i over V, V^2 = sum d_i^2, has tails little above those of a normal variable N:
 
-    P(|S| >= t V) <= 2 exp(-t^2 / 2)          [Hoeffding 1963, theorem 2, given the sizes; Efron 1969]
+    P(|S| >= t V) <= 2 exp(-t^2 / 2)         [Hoeffding 1963, theorem 2, given the sizes; so Efron 1969]
+    P(|S| >= t V) <= 2 c P(N >= t), c < 3.18 [Bentkus and Dzindzalieta 2015, theorem 1.1]
 
 A firefly makes V as large as S, so it proves nothing. What counts as one difference is chosen in three ways:
 
@@ -30,6 +31,7 @@ ENOUGH = 64
 # blocks of 4 x 4 pixels, which therefore depend on each other.
 ARRANGED = 4
 LEAST_P = 1e-300
+TAIL = 3.18  # c above: 1 / (4 P(N >= sqrt(2))), rounded up
 
 
 @dataclass(frozen=True)
@@ -73,28 +75,61 @@ Found = tuple[int, Array]  # side of the regions; logarithms of p-values, (rows,
 
 def _samples(evidence: Evidence) -> Iterator[Found]:
     samples = min(evidence.a.samples, evidence.b.samples)
-    difference, rounding = evidence.difference, evidence.rounding
+    difference, rounding, brightness = evidence.difference, evidence.rounding, evidence.brightness
     # The sum over the samples of their squared differences, divided by the square of their number.
     squares = evidence.variance + difference**2 / samples
+    regions = list[_Regions]()
     for side in sides(evidence.shape):
         if side > 1:
             difference, rounding, squares = blocks(difference), blocks(rounding), blocks(squares)
+            brightness = blocks(brightness)
         if samples * side**2 >= ENOUGH or side >= max(evidence.shape):
-            yield side, _two_sided(difference, rounding, squares)
+            regions.append(_Regions(side, difference, rounding, squares, brightness))
+    yield from _tested(regions)
 
 
 def _groups(evidence: Evidence) -> Iterator[Found]:
     squares, groups = evidence.squares, evidence.groups
     difference, rounding = evidence.difference * groups, evidence.rounding * groups
-    # One side of fewer samples than the other has other noise: most of its pixels are too dark where light is rare,
-    # so that signs do not balance. Then the difference has at least the variance that the samples tell.
-    least = np.zeros_like(difference) if evidence.balanced else evidence.variance
+    brightness, regions = evidence.brightness, list[_Regions]()
+    # Of unequal numbers of samples the signs do not balance, so that the variance that the samples tell counts, too.
+    equal = evidence.a.samples == evidence.b.samples
+    least = np.zeros_like(difference) if equal else evidence.variance
     for level, side in enumerate(sides(evidence.shape)):
         if level > 0:
-            difference, rounding, least = blocks(difference), blocks(rounding), blocks(least)
+            difference, rounding, brightness = blocks(difference), blocks(rounding), blocks(brightness)
+            least = blocks(least)
         unit = _unit(evidence.shape, side, groups)
         if unit is not None:
-            yield side, _two_sided(difference, rounding, np.maximum(blocks(squares[unit], side >> unit), least))
+            summed = np.maximum(blocks(squares[unit], side >> unit), least)
+            regions.append(_Regions(side, difference, rounding, summed, brightness))
+    yield from _tested(regions)
+
+
+@dataclass(frozen=True)
+class _Regions:
+    """All regions of one size, (rows, columns, channels) each."""
+
+    side: int
+    sums: Array
+    rounding: Array
+    squares: Array
+    brightness: Array
+
+
+def _tested(regions: list[_Regions]) -> Iterator[Found]:
+    """The squares of a region are at least its share, by brightness, of those of each larger region. Two estimators
+    of the same light have noise of different kinds: where one of them happened to find no light, nothing there would
+    tell that some is missing. The variance of light that is seldom found goes with its mean, by Poisson's law."""
+    least, above = np.zeros((1, 1, 1)), regions[-1].side if regions else 1  # squares by brightness, of larger regions
+    for each in reversed(regions):
+        own = _ratio(each.squares, each.brightness)
+        least, above = np.maximum(own, _spread(least, above // each.side, own.shape)), each.side
+        yield each.side, _two_sided(each.sums, each.rounding, np.maximum(each.squares, least * each.brightness))
+
+
+def _spread(values: Array, times: int, shape: tuple[int, ...]) -> Array:
+    return np.asarray(np.repeat(np.repeat(values, times, axis=0), times, axis=1)[: shape[0], : shape[1]])
 
 
 def _structure(evidence: Evidence) -> Iterator[Found]:
@@ -112,7 +147,7 @@ def _structure(evidence: Evidence) -> Iterator[Found]:
         units = blocks(products, 2**unit)
         total = blocks(units, side >> unit)
         excess = np.maximum(total - blocks(by_rounding, side), 0.0)
-        yield side, -0.5 * _ratio(excess**2, blocks(units**2, side >> unit))
+        yield side, _log_tail(_ratio(excess**2, blocks(units**2, side >> unit)))
 
 
 def _unit(shape: tuple[int, int], side: int, groups: int) -> int | None:
@@ -128,7 +163,14 @@ def _unit(shape: tuple[int, int], side: int, groups: int) -> int | None:
 def _two_sided(sums: Array, rounding: Array, squares: Array) -> Array:
     """Logarithms of p-values, at most 0."""
     excess = np.maximum(np.abs(sums) - rounding, 0.0)
-    return np.asarray(np.minimum(np.log(2.0) - 0.5 * _ratio(excess**2, squares), 0.0))
+    return np.asarray(np.minimum(np.log(2.0) + _log_tail(_ratio(excess**2, squares)), 0.0))
+
+
+def _log_tail(squared: Array) -> Array:
+    """The logarithm of the lower one of the two bounds for one side, of t squared. The normal tail is bounded as
+    Sampford (1953) does, 4 / (3 t + sqrt(t^2 + 8)) times the density, which is 0.3 % above it at t = 2."""
+    normal = np.log(4 * TAIL / np.sqrt(2 * np.pi) / (3 * np.sqrt(squared) + np.sqrt(squared + 8)))
+    return np.asarray(np.minimum(normal, 0.0) - 0.5 * squared)
 
 
 def _ratio(above: Array, below: Array) -> Array:

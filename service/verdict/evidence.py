@@ -86,9 +86,9 @@ class Evidence:
         self.paired, self.groups = False, 1
 
     @property
-    def balanced(self) -> bool:
-        """Whether both sides have as many samples."""
-        return self.a.samples == self.b.samples
+    def brightness(self) -> Array:
+        """The mean of both, by channel."""
+        return np.asarray(0.5 * (np.abs(self.a.mean) + np.abs(self.b.mean)) @ CHANNELS)
 
     @property
     def shape(self) -> tuple[int, int]:
