@@ -18,11 +18,13 @@ LosslessFormat = Literal["png", LinearFormat]  # what the command line writes
 FileFormat = Literal["png", LossyFormat, "avif", LinearFormat]
 StreamFormat = Literal[LossyFormat, "png", "rgba32f"]
 BsdfKind = Literal["polar", "distribution", "geometry", "fresnel", "albedo", "slice"]  # of a material, to look at
+MapKind = Literal["p", "difference", "flip", "heat"]  # of where two pictures differ
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 AOVS: tuple[Aov, ...] = get_args(Aov)
 TONE_MAPS: tuple[ToneMap, ...] = get_args(ToneMap)
 BSDF_KINDS: tuple[BsdfKind, ...] = get_args(BsdfKind)
+MAPS: tuple[MapKind, ...] = get_args(MapKind)
 LOSSLESS_FORMATS: tuple[LosslessFormat, ...] = get_args(LosslessFormat)
 DEFAULT_TONE_MAP: Final = "pbr_neutral"
 LEAST_EXPOSURE, MOST_EXPOSURE = -60, 60  # stops

@@ -31,7 +31,7 @@ from service.system.executors import comparing, opening, packing, storing
 from service.verdict import comparison
 from service.verdict.comparison import Side, Source, Still, Taken, Verdict
 from service.verdict.evidence import PIXEL_BYTES, Estimate
-from service.verdict.maps import MapKind
+from service.views import MapKind
 
 router = APIRouter(prefix="/v1", tags=["compare"])
 

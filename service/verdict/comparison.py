@@ -17,9 +17,10 @@ from service.system.executors import comparing
 from service.verdict.decision import Decision, decide
 from service.verdict.evidence import Array, Estimate, Evidence, Sum
 from service.verdict.figures import Figures, figures
-from service.verdict.maps import MapKind, drawn
+from service.verdict.maps import drawn
 from service.verdict.regions import Region, p_map, regions
 from service.verdict.schedule import USUAL_SAMPLES, Schedule, of_one_document, of_two_documents
+from service.views import MapKind
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 import numpy.typing as npt
 
 from service.colorimetry import LUMINANCE
 from service.verdict.evidence import Array
 from service.verdict.figures import displayed, flip_map
-
-MapKind = Literal["p", "difference", "flip", "heat"]
+from service.views import MapKind
 
 # Magma at equal steps, in bytes of sRGB; linear in between it is 5 % off at most [van der Walt and Smith 2015, CC0].
 MAGMA = np.array(

@@ -10,6 +10,7 @@ errors           the exceptions
 files            the files that a scene names, and arrays in it
 frames           a frame of a stream
 lobes            what a BSDF answers, as arrays
+verdicts         whether two pictures differ beyond noise
 merge            merge patches (RFC 7386)
 progress         a line while a render goes on
 view             View: a live picture in a notebook
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from sunbox.frames import Frame
     from sunbox.lobes import Albedo, Bsdf, SpecularLobe
     from sunbox.local import render
+    from sunbox.verdicts import Region, Verdict
     from sunbox.view import View
 
 _PLACES = {
@@ -54,6 +56,7 @@ _PLACES = {
     "frames": ("Frame",),
     "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
     "local": ("render",),
+    "verdicts": ("Region", "Verdict"),
     "view": ("View",),
 }
 _MODULE = {name: module for module, names in _PLACES.items() for name in names}
@@ -74,10 +77,12 @@ __all__ = [
     "NotFound",
     "Picture",
     "Refused",
+    "Region",
     "SpecularLobe",
     "Stream",
     "SunboxError",
     "Unreachable",
+    "Verdict",
     "View",
     "render",
 ]

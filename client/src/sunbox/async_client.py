@@ -13,7 +13,7 @@ from urllib.parse import quote, urlencode
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sunbox import files, lobes
+from sunbox import files, lobes, verdicts
 from sunbox.async_batch import AsyncBatch
 from sunbox.async_job import AsyncJob, AsyncPicture
 from sunbox.async_stream import AsyncStream
@@ -133,6 +133,15 @@ class AsyncClient:
         """A context manager and iterator of frames, each better than the one before. `format`: rgba32f, png, jpeg or
         webp."""
         return AsyncStream(self._transport, scene, format, settings)
+
+    async def compare(
+        self, a: Any, b: Any, confidence: float = 0.999, map: str | None = None, **settings: Any
+    ) -> verdicts.Verdict:
+        """Whether two pictures differ beyond noise. Each side is a scene, `{"scene": ..., "settings": ...}`, a render
+        (a job or its id), or an EXR file with every layer (its path, or its id on the server). Scenes are rendered
+        with the same seeds, up to the `max_samples` of their settings, to which `settings` are added. `map`: p,
+        difference, flip or heat also brings a picture of where they differ. Cancelled, it ends the work."""
+        return await verdicts.compare(self._transport, a, b, confidence, map, settings)
 
     async def upload(self, file: str | Path | bytes, name: str = "") -> str:
         """The id of a file on the server, from its path or its bytes; `name` tells how bytes are to be read

@@ -18,6 +18,7 @@ from sunbox.async_stream import AsyncStream
 from sunbox.background import Background
 from sunbox.frames import Frame
 from sunbox.lobes import Albedo, Bsdf
+from sunbox.verdicts import Verdict
 
 T = TypeVar("T")
 _background = Background()  # of all clients: one loop, one thread
@@ -98,6 +99,10 @@ class Client:
     def stream(self, scene: Any, format: str = "rgba32f", **settings: Any) -> Stream:
         """A context manager and iterator of frames, each better than the one before."""
         return Stream(self._client.stream(scene, format, **settings))
+
+    def compare(self, a: Any, b: Any, confidence: float = 0.999, map: str | None = None, **settings: Any) -> Verdict:
+        """Whether two scenes, renders or EXR files differ beyond noise. Ctrl-C ends the work."""
+        return run(self._client.compare(a, b, confidence, map, **settings))
 
     def upload(self, file: str | Path | bytes, name: str = "") -> str:
         """The id of a file on the server, from its path or its bytes; a content is sent once."""

@@ -50,13 +50,22 @@ class Transport:
         return answer.json() if answer.content else None
 
     async def request(
-        self, method: str, path: str, data: bytes | None = None, headers: Mapping[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        data: bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+        patient: bool = False,
     ) -> httpx2.Response:
-        """A request that may be sent twice: every one that this package makes. Raises SunboxError."""
+        """A request that may be sent twice: every one that this package makes. `patient`: its answer may take as long
+        as it takes. Raises SunboxError."""
+        timeout = httpx2.Timeout(self.timeout, read=None) if patient else httpx2.Timeout(self.timeout)
         for attempt in range(self.retries + 1):
             is_last = attempt == self.retries
             try:
-                answer = await self._http.request(method, self.url + path, content=data, headers=headers)
+                answer = await self._http.request(
+                    method, self.url + path, content=data, headers=headers, timeout=timeout
+                )
             except httpx2.TransportError as error:
                 if is_last or (not self._has_answered and attempt == FIRST_CONTACT):
                     raise self._unreachable(error) from None
