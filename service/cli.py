@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | sweep | turntable | renders | bsdf | import | info | ...`.
+"""The command line: `sunbox serve | render | sweep | turntable | compare | test | renders | bsdf | import | ...`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module, metadata
 
 from service.commands import CommandError
-from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
+from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, MAPS, TONE_MAPS
 
 BENCHES = ("speed", "gpu", "tradeoff", "seeds", "scale")
 
@@ -53,6 +53,8 @@ def parser() -> argparse.ArgumentParser:
     _render(commands.add_parser("render", help="render a scene to a file"))
     _sweep(commands.add_parser("sweep", help="render a scene with other values, onto a contact sheet"))
     _turntable(commands.add_parser("turntable", help="render a turn of the camera about its target, as an animation"))
+    _compare(commands.add_parser("compare", help="say whether two scenes or pictures differ beyond noise"))
+    _test(commands.add_parser("test", help="compare the scenes of a folder with those of another"))
     _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
@@ -119,6 +121,39 @@ def _batch(command: argparse.ArgumentParser, output: str) -> None:
     add("-o", "--output", required=True, metavar="OUT", help=output)
     add("--width", type=int, metavar="N", help="pixels of each picture in OUT, which are scaled down to it")
     add("--exposure", type=float, default=0.0, metavar="STOPS", help="of the pictures (default: 0)")
+    _settings(command)
+    add("--server", metavar="URL", help="a server that renders it (default: this machine, without one)")
+    _asset_root(command)
+
+
+def _compare(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    for name in "ab":
+        text = "a scene's JSON, a PNG or EXR that Sunbox made, or the id of a render on --server"
+        add(name, metavar=name.upper(), help=f"{text}; of an EXR with --aov all its own samples are compared")
+    add("-o", "--output", metavar="MAP", help="also write a map of where they differ: .png")
+    _verdict(command)
+    command.epilog = "Exit codes: 0 the same within noise, 1 different, 2 bad input, 3 it could not be told."
+
+
+def _test(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("folder", metavar="FOLDER", help="scenes (.json) to test, and EXR files with every layer (--aov all)")
+    text = "the folder with what they are to look like, under the same names: .json or .exr"
+    add("--against", required=True, metavar="REF", help=text)
+    add("-o", "--output", metavar="SHEET", help="also write a contact sheet of those that differ: .png")
+    add("--junit", metavar="REPORT", help="also write a report for continuous integration: .xml")
+    _verdict(command)
+    text = "0 all are the same within noise, 1 one differs or is in one folder only, 2 bad input, 3 it could not be "
+    command.epilog = f"Exit codes: {text}told."
+
+
+def _verdict(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    text = "how sure it has to be: false alarms come at one minus that, or less (default: 0.999)"
+    add("--confidence", type=float, default=0.999, metavar="C", help=text)
+    text = f"what the map shows: {_any_of(MAPS)} (default: p, how sure it is)"
+    add("--map", choices=MAPS, default=MAPS[0], help=text)
     _settings(command)
     add("--server", metavar="URL", help="a server that renders it (default: this machine, without one)")
     _asset_root(command)

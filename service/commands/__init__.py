@@ -4,6 +4,9 @@ render         a picture of a document, into a file
 renders        the renders of a server: submitted, listed, waited for, fetched, cancelled
 sweep          a scene with other values, on a contact sheet
 turntable      a turn of the camera, as an animation
+compare        whether two scenes or pictures differ beyond noise
+test           the scenes of a folder beside those of another
+comparing      what these two compare, and what they say of it
 own_server     a server for as long as a command needs one
 api            requests to a server
 serve          the editor and the API

@@ -32,9 +32,9 @@ def server(url: str | None) -> Iterator[Client]:
         with client:
             yield client
     except Refused as error:
-        raise BadInput(*_lines(error)) from None
+        raise BadInput(*lines_of(error)) from None
     except SunboxError as error:
-        raise Failed(*_lines(error)) from None
+        raise Failed(*lines_of(error)) from None
 
 
 def _authority(host: str) -> str:
@@ -42,7 +42,7 @@ def _authority(host: str) -> str:
     return f"[{reachable}]" if ":" in reachable else reachable
 
 
-def _lines(error: SunboxError) -> list[str]:
+def lines_of(error: SunboxError) -> list[str]:
     """What is wrong, a line for each field."""
     title = f"{error.title}: " if error.title else ""
     return [f"{pointer or '/'}: {detail}" for pointer, detail in error.errors] or [f"{title}{error.detail}"]
