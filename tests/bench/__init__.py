@@ -21,5 +21,6 @@ soak_restarts   `restarts`: a thousand renders while the server is restarted, it
 soak_server     the server under test of `soak` and `restarts`
 soak_tally      the results of `soak`, counted
 gallery         the README's pictures
+verdict         false alarms of comparisons
 thumbnails      the editor's pictures of the material presets
 """

@@ -70,6 +70,8 @@ def parser() -> argparse.ArgumentParser:
         add("restarts", soak_restarts.run, "a thousand renders while the whole server is restarted", False)
     )
     gallery.add_options(add("gallery", gallery.run, "render the README's pictures again", False))
+    command = add("verdict", _verdict, "false alarms of a verdict over pairs that differ by noise alone")
+    command.add_argument("--pairs", type=_count, default=1000, metavar="N", help="of each kind (default: 1000)")
     add("thumbnails", _thumbnails, "render the editor's pictures of the material presets again", False)
     return top
 
@@ -140,6 +142,20 @@ def _hemisphere(arguments: argparse.Namespace) -> int:
     write_figures(output, document)
     if figure:
         hemisphere.figure(document, figure)
+    return 0
+
+
+def _verdict(arguments: argparse.Namespace) -> int:
+    output = output_path(arguments.output)
+    from gpu import GpuError
+    from tests.bench import verdict
+
+    try:
+        rows = verdict.run(arguments.pairs, progress)
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    print(verdict.table(rows))
+    write_figures(output, rows)
     return 0
 
 
