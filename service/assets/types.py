@@ -75,6 +75,7 @@ class RenderedPicture:
     samples: int  # of each pixel
     seed: int
     denoised: bool
+    ways: tuple[str, str, int]  # how light was found: estimator, sampler, depth from which paths may end
 
 
 @dataclass(frozen=True)

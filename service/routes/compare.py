@@ -29,7 +29,7 @@ from service.routes.errors import GONE
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.system.executors import comparing, opening, packing, storing
 from service.verdict import comparison
-from service.verdict.comparison import Side, Source, Still, Taken, Verdict
+from service.verdict.comparison import Side, Source, Still, Taken, Verdict, ways_of
 from service.verdict.evidence import PIXEL_BYTES, Estimate
 from service.views import MapKind
 
@@ -166,7 +166,7 @@ class _Sides:
         if settings.denoise:
             raise _denoised()
         with renders.looking(job):
-            return Still(await _estimate(job), settings.seed)
+            return Still(await _estimate(job), settings.seed, ways_of(settings))
 
     async def _asset(self, id: str) -> Still:
         """An EXR file of ours. Raises NotFound, AssetError, InvalidDocument."""
@@ -182,7 +182,8 @@ class _Sides:
         if picture.denoised:
             raise _denoised()
         color, variance = picture.layers[..., :3], picture.layers[..., 3:]
-        return Still(await comparing(partial(Estimate.of, color, variance, picture.samples)), picture.seed)
+        estimate = await comparing(partial(Estimate.of, color, variance, picture.samples))
+        return Still(estimate, picture.seed, picture.ways)
 
 
 async def _estimate(job: Job) -> Estimate:

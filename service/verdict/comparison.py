@@ -22,6 +22,13 @@ from service.verdict.regions import Region, p_map, regions
 from service.verdict.schedule import USUAL_SAMPLES, Schedule, of_one_document, of_two_documents
 from service.views import MapKind
 
+# How light is found: estimator, sampler, and the depth from which paths may end.
+Ways = tuple[str, str, int]
+
+
+def ways_of(settings: ResolvedSettings) -> Ways:
+    return settings.estimator, settings.sampler, settings.roulette_depth
+
 
 @dataclass(frozen=True)
 class Still:
@@ -29,6 +36,7 @@ class Still:
 
     estimate: Estimate
     seed: int
+    ways: Ways
 
     @property
     def size(self) -> tuple[int, int]:
@@ -55,6 +63,10 @@ class Source:
     @property
     def size(self) -> tuple[int, int]:
         return self.settings.render_width, self.settings.render_height
+
+    @property
+    def ways(self) -> Ways:
+        return ways_of(self.settings)
 
     @property
     def samples(self) -> int:
@@ -102,7 +114,7 @@ async def compare(a: Side, b: Side, confidence: float) -> Verdict:
         evidence, decision = await _of_one_document(b, a, "b", alpha)
     else:
         assert isinstance(a, Still) and isinstance(b, Still)
-        evidence = await comparing(partial(Evidence, a.estimate, b.estimate))
+        evidence = await comparing(partial(Evidence, a.estimate, b.estimate, a.ways == b.ways))
         decision = await comparing(partial(decide, evidence))
     return await comparing(partial(_verdict, evidence, decision, alpha))
 
@@ -150,7 +162,7 @@ async def _of_two_documents(a: Source, b: Source, alpha: float) -> tuple[Evidenc
         first, second = await _together(*(each.render(own) for each, own in zip((a, b), settings, strict=True)))
         limits.spend(max(first.elapsed_s, second.elapsed_s))
         if evidence is None:
-            evidence = await comparing(partial(Evidence, first.estimate, second.estimate))
+            evidence = await comparing(partial(Evidence, first.estimate, second.estimate, a.ways == b.ways))
         else:
             await comparing(partial(evidence.add, first.estimate, second.estimate))
         ends = limits.reached(evidence.a, evidence.b)
@@ -171,7 +183,7 @@ async def _of_one_document(source: Source, still: Still, side: str, alpha: float
         limits.spend(taken.elapsed_s)
         if evidence is None:
             pair = (taken.estimate, still.estimate) if side == "a" else (still.estimate, taken.estimate)
-            evidence = await comparing(partial(Evidence, *pair))
+            evidence = await comparing(partial(Evidence, *pair, source.ways == still.ways))
         else:
             await comparing(partial(evidence.add_to, side, taken.estimate))
         best = await _looked(evidence, schedule, best)

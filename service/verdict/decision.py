@@ -92,9 +92,9 @@ def _groups(evidence: Evidence) -> Iterator[Found]:
     squares, groups = evidence.squares, evidence.groups
     difference, rounding = evidence.difference * groups, evidence.rounding * groups
     brightness, regions = evidence.brightness, list[_Regions]()
-    # Of unequal numbers of samples the signs do not balance, so that the variance that the samples tell counts, too.
-    equal = evidence.a.samples == evidence.b.samples
-    least = np.zeros_like(difference) if equal else evidence.variance
+    # Else the signs do not balance, so that the variance that the samples tell counts, too.
+    even = evidence.alike and evidence.a.samples == evidence.b.samples
+    least = np.zeros_like(difference) if even else evidence.variance * groups**2
     for level, side in enumerate(sides(evidence.shape)):
         if level > 0:
             difference, rounding, brightness = blocks(difference), blocks(rounding), blocks(brightness)
@@ -134,7 +134,7 @@ def _spread(values: Array, times: int, shape: tuple[int, ...]) -> Array:
 
 def _structure(evidence: Evidence) -> Iterator[Found]:
     halves = evidence.halves
-    if halves is None:
+    if halves is None or not evidence.alike:
         return
     even, odd = halves
     by_rounding = (evidence.rounding * evidence.a.samples / 2) ** 2

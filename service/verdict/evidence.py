@@ -61,8 +61,10 @@ class Sum:
 class Evidence:
     """Both sides, and their differences where groups of both have the same seeds."""
 
-    def __init__(self, a: Estimate, b: Estimate) -> None:
-        self.a, self.b = Sum(a), Sum(b)
+    def __init__(self, a: Estimate, b: Estimate, alike: bool = True) -> None:
+        """`alike`: whether both sides find light in the same ways. Those of two estimators do not, so that one may be
+        noisy where the other one is not."""
+        self.a, self.b, self.alike = Sum(a), Sum(b), alike
         self.groups = 1
         self.paired = True  # each side has as many groups as the other, and they were added together
         difference = (b.mean - a.mean) @ CHANNELS

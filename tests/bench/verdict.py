@@ -17,6 +17,7 @@ from service.pack import Packed, pack
 from service.quality import ResolvedSettings, resolve
 from service.routes.examples import SCENE
 from service.scene import parse_scene, parse_settings
+from service.verdict.comparison import ways_of
 from service.verdict.decision import decide
 from service.verdict.evidence import Estimate, Evidence
 from service.verdict.schedule import of_two_documents, seeds_from
@@ -100,7 +101,7 @@ class Pairs:
                 a = self.estimate(scene, replace(first, seed=group.seed, max_samples=group.samples))
                 b = self.estimate(scene, replace(second, seed=seed, max_samples=group.samples))
                 if found is None:
-                    found = Evidence(a, b)
+                    found = Evidence(a, b, ways_of(first) == ways_of(second))
                 else:
                     found.add(a, b)
                 if group.look:

@@ -129,6 +129,12 @@ def test_other_ways_to_the_same_light_do_not_differ(http: httpx.Client) -> None:
     scene["materials"]["ball"] = {"type": "diffuse", "albedo": 0.5}
     for other in ({"estimator": "bsdf"}, {"sampler": "independent"}, {"filter": "blackman_harris", "seed": 9}):
         assert not compare(http, document(scene), document(scene, **other))["different"], other
+    del scene["environment"]  # the lamp alone is seldom found without looking for it
+    first, second = (ended(http, scene, estimator=each) for each in ("mis", "bsdf"))
+    for b in (document(scene, estimator="bsdf"), second):
+        assert not compare(http, first, b)["different"]
+    assert not compare(http, exr(http, first), second)["different"]
+    assert not compare(http, document(scene), document(scene, estimator="bsdf"))["different"]
 
 
 def test_renders_of_other_seeds_do_not_differ_and_stay_as_they_are(http: httpx.Client) -> None:

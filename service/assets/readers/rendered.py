@@ -34,7 +34,9 @@ def parse_rendered(data: bytes, limits: AssetLimits) -> RenderedPicture:
     samples = _whole(made.get("samples"), MOST_SAMPLES)
     if samples < 1:
         raise ParseError("its metadata do not say how many samples it has: Sunbox did not write it")
-    return RenderedPicture(layers, samples, _whole(settings.get("seed"), 2**32 - 1), settings.get("denoise") is True)
+    seed, depth = (_whole(settings.get(name), 2**32 - 1) for name in ("seed", "roulette_depth"))
+    ways = str(settings.get("estimator"))[:20], str(settings.get("sampler"))[:20], depth
+    return RenderedPicture(layers, samples, seed, settings.get("denoise") is True, ways)
 
 
 def _layer(file: Any, names: list[str], wanted: tuple[str, ...]) -> Floats:

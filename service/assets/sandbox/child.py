@@ -103,7 +103,7 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
         return {"scene": [np.frombuffer(text, np.uint8)], "files": files}, {}
     if isinstance(parsed, RenderedPicture):
-        facts = {"samples": parsed.samples, "seed": parsed.seed, "denoised": parsed.denoised}
+        facts = {name: value for name, value in vars(parsed).items() if name != "layers"}
         return {"layers": [parsed.layers]}, facts
     if isinstance(parsed, ImageData):
         return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}

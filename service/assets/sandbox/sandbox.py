@@ -195,7 +195,11 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
     if "pixels" in arrays:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
     if "layers" in arrays:
-        return RenderedPicture(arrays["layers"], int(reply["samples"]), int(reply["seed"]), bool(reply["denoised"]))
+        estimator, sampler, depth = reply["ways"]
+        return RenderedPicture(
+            arrays["layers"], int(reply["samples"]), int(reply["seed"]), bool(reply["denoised"]),
+            (str(estimator), str(sampler), int(depth)),
+        )  # fmt: skip
     if "scene" in arrays:
         return _scene(arrays["scene"], arrays["files"])
     return mesh_of(arrays, tuple(map(str, reply["warnings"])), _oddities(reply["oddities"]))

@@ -84,6 +84,24 @@ def test_one_side_of_few_samples_is_not_more_certain_than_the_other_one_says() -
     assert alarms <= most_alarms(PAIRS, LEVEL)
 
 
+@pytest.mark.parametrize("alike", [False, True])
+def test_light_that_one_side_seldom_finds_is_not_missing(alike: bool) -> None:
+    """As of two estimators, one of which finds a lamp with one sample in two hundred; also where nobody says that
+    there are two."""
+    rng, alarms = np.random.default_rng(6), 0
+    for _ in range(20):
+        found = None
+        for _ in range(16):
+            steady, seldom = rng.normal(1, 0.1, (4, 16, 16, 3)), (rng.random((4, 16, 16, 3)) < 0.005) * 200.0
+            if found is None:
+                found = Evidence(estimate(steady), estimate(seldom), alike)
+            else:
+                found.add(estimate(steady), estimate(seldom))
+        assert found is not None
+        alarms += decide(found).p_value < LEVEL
+    assert alarms <= most_alarms(20, LEVEL)
+
+
 def test_equal_pictures_do_not_differ() -> None:
     same = estimate(np.random.default_rng(0).exponential(1, (8, 20, 30, 3)))
     found = Evidence(same, same)
