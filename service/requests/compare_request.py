@@ -16,7 +16,7 @@ from service.scene.base import Model
 from service.scene.validation import both, validated
 
 CONFIDENCE = 0.999
-# Of a picture that is compared. More are no more certain, and one takes 400 bytes of memory while it is.
+# Of a picture that is compared. More are no more certain, and one takes 640 bytes of memory while it is.
 MOST_PIXELS = 2**22
 
 
