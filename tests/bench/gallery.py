@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -118,7 +119,9 @@ def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: 
     with subprocess.Popen([sunbox, "serve", "--port", str(port)]) as server, sync_playwright() as playwright:
         try:
             time.sleep(3)
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium") or shutil.which("chromium-headless-shell"), args=flags
+            )
             _photograph(browser, server, names, port, wait_s)
         finally:
             server.terminate()
@@ -130,6 +133,7 @@ def _photograph(
     for name in names:
         (width, height), scheme, acts = STATES[name]
         page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
+        page.add_init_script("localStorage['sunbox.ui'] ??= JSON.stringify({ hint: false })")  # read by now
         # The first scene, where all of the page is shown; a quicker one, where a part of it is.
         page.goto(f"http://127.0.0.1:{port}/{'' if name in FIRST_SCENE else '#scene=sphere-on-floor'}")
         page.wait_for_selector("#stage.live")

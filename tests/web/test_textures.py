@@ -167,3 +167,26 @@ def test_textures_are_used_again_and_checkers_made(editor: Editor) -> None:
         "checker",
     ]
     assert document["textures"]["checker"] == {"type": "checker", "a": 0.8, "b": 0.2}
+
+
+def test_a_materials_picture_shows_its_texture(editor: Editor) -> None:
+    page = editor.page
+    # How much green is over red where that is most, and how little: of a ball of one colour both are the same sign.
+    greens = """(image) => {
+        const context = new OffscreenCanvas(8, 8).getContext("2d");
+        context.drawImage(image, 0, 0, 8, 8);
+        const { data } = context.getImageData(2, 2, 4, 4);
+        const over = [...data.keys()].filter((i) => i % 4 === 0).map((i) => data[i + 1] - data[i]);
+        return [Math.max(...over), Math.min(...over)];
+    }"""
+    ball = page.locator("#materials [data-value=subject] img")
+    assert ball.evaluate(greens)[0] < 0, "it is red"
+    editor.drop("#material-form [data-field=base_color]", {"halves.png": halves(left=(0, 220, 0))})
+    editor.wait("the texture", lambda: page.is_visible(BENEATH))
+    page.click("#pause")  # then there is time for small pictures
+    editor.wait("green on the ball, and not on all of it", lambda: shows(ball.evaluate(greens)))
+
+
+def shows(greens: list[float]) -> bool:
+    most, least = greens
+    return most > 40 and least < most / 2

@@ -1,6 +1,7 @@
 // What the scene contains, as a tree to pick from, and what can be added to it.
 
 import { additions } from "../document/additions.js";
+import { watchOffers } from "../lib/offers.js";
 import { isNameable, isOn, named, rows, toggled, without } from "../document/outline.js";
 import { at } from "../lib/patch.js";
 import { element } from "../lib/dom.js";
@@ -31,11 +32,7 @@ export class Outliner {
     const offers = additions(schema);
     const choice = find("add");
     choice.append(...offers.map(({ title }, i) => element("option", { value: String(i) }, title)));
-    choice.addEventListener("change", () => {
-      const offer = offers[Number(choice.value)];
-      choice.value = "";
-      add(offer);
-    });
+    watchOffers(choice, (value) => add(offers[Number(value)]));
   }
 
   #rowAt(target) {

@@ -144,8 +144,12 @@ export class Markers {
     this.#make(marks);
     marks.forEach(({ x, y, isInside, isChosen }, i) => {
       const mark = this.#buttons.children[i];
-      mark.style.setProperty("left", `${100 * x}%`);
-      mark.style.setProperty("top", `${100 * y}%`);
+      mark.style.setProperty("left", isInside ? `${100 * x}%` : `min(${100 * x}%, 100% - var(--axes))`);
+      // One outside of the picture stays clear of the tools, the pill and the axes, which lie over its edges.
+      mark.style.setProperty(
+        "top",
+        isInside ? `${100 * y}%` : `clamp(var(--clear), ${100 * y}%, 100% - var(--clear))`,
+      );
       mark.classList.toggle("outside", !isInside);
       mark.classList.toggle("chosen", isChosen);
       mark.tabIndex = isChosen ? 0 : -1;
