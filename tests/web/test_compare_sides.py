@@ -112,10 +112,12 @@ def test_a_render_lies_on_the_picture_and_a_link_keeps_it(editor: Editor, server
 def test_a_snapshot_is_compared_with_what_came_of_it(editor: Editor) -> None:
     page = editor.page
     finish(editor, 4)
+    page.click("#tab-properties")  # beside the sheet Render the picture has the final one's shape
+    editor.rest("its size", lambda: page.evaluate("[picture.width, picture.height]"))
+    editor.wait("the end", lambda: editor.text("#state") == "Done")
     before = overlay(editor, "picture")[..., :3].astype(float)
     page.locator("#stage").press("n")
     editor.wait("it", lambda: "Snapshot taken" in (page.text_content("#announcer") or ""))
-    page.click("#tab-properties")
     page.click("#library [data-value=gold]")
     page.click("#compare")
     choose(editor, "Left", "snapshot")

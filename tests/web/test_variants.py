@@ -104,6 +104,7 @@ def test_b_is_awaited_in_words_and_a_link_keeps_the_way_of_comparing(editor: Edi
 
 def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     finish(editor, 4)
+    editor.page.click("#tab-properties")  # beside the sheet Render the picture has the final one's shape
     editor.page.click("#compare")
     editor.page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
     labels = editor.page.locator(".variant")
