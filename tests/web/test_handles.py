@@ -227,3 +227,42 @@ def test_what_lies_under_a_thing_is_its_ground(page: Page) -> None:
     assert under(beside, floor, table) == 0, "sunk in by half it comes up again"
     assert under({"low": [8, 3, 8], "high": [9, 4, 9]}, floor, table) == 0, "beside everything: as low as the others"
     assert under(ball) is None
+
+
+def test_several_are_moved_turned_and_scaled_together(editor: Editor) -> None:
+    page = editor.page
+    editor.pick("scenes", "point-lights")
+    editor.wait("the scene", lambda: editor.text("#scene-title") == "Two point lights")
+    editor.outline(True)
+    before = document(editor)
+    page.set_viewport_size({"width": 1200, "height": 560})  # where the outline stays beside the picture
+    page.click("#outline-list [data-thing='/shapes/0'] .title")
+    for thing in ("/shapes/1", "/lights/0"):
+        page.locator(f"#outline-list [data-thing='{thing}'] .title").click(modifiers=["Control"])
+    page.keyboard.press("2")
+    page.locator("#stage").press("ArrowRight")
+    moved = document(editor)
+    step = moved["shapes"][0]["center"][0] - before["shapes"][0]["center"][0]
+    assert step > 0
+    was, now = before["shapes"][1].get("transform", {}), moved["shapes"][1]["transform"]
+    gone = np.subtract(now["translate"], was.get("translate", [0, 0, 0]))
+    assert gone == pytest.approx([step, 0, 0], abs=1e-5)
+    gone = np.subtract(moved["lights"][0]["position"], before["lights"][0]["position"])
+    assert gone == pytest.approx([step, 0, 0], abs=1e-5)
+    assert moved["shapes"][2:] == before["shapes"][2:] and moved["lights"][1] == before["lights"][1]
+    page.click("#undo")
+    assert document(editor) == before, "one step of undo"
+
+    page.keyboard.press("4")
+    page.locator("#stage").press("Shift+ArrowUp")
+    grown = document(editor)
+    assert grown["shapes"][0]["radius"] == pytest.approx(1.1 * before["shapes"][0]["radius"])
+
+    def apart(scene: Any) -> float:
+        return math.dist(scene["shapes"][0]["center"], scene["lights"][0]["position"])
+
+    assert apart(grown) == pytest.approx(1.1 * apart(before)), "about their common middle"
+    page.click("#outline-list [data-thing='/shapes/0'] .title")
+    page.keyboard.press("2")
+    page.locator("#stage").press("ArrowRight")
+    assert document(editor)["shapes"][1] == grown["shapes"][1], "and alone again"

@@ -46,6 +46,7 @@ export class Editor extends Store {
   #origins = new Origins();
   #arrival = null; // the material that was put somewhere last, and what was there before
   conversions = new Conversions();
+  selection = []; // things that are selected together, as the outline has them
 
   // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true.
   constructor({ schema, name, scene, complain, forgive, waits }) {

@@ -83,7 +83,7 @@ export class Outliner {
     const [from, to] = [Math.max(0, Math.min(...ends)), Math.max(...ends)];
     this.#active = row.id;
     this.#selected = new Set([this.#state.chosen.thing, ...open.slice(from, to + 1).flatMap((each) => each.members)]);
-    this.show(this.#state);
+    this.acts.select(this.#state.chosen.thing);
   }
 
   #fold(row, isShut) {
@@ -180,6 +180,7 @@ export class Outliner {
       this.#selected = new Set([chosen.thing]);
       this.#active = chosen.thing;
     }
+    this.acts.selection = [...this.#selected];
     const made = rows(scene);
     if (!equal(made, this.#rows)) {
       this.#rows = made;

@@ -15,10 +15,10 @@ import {
   turning,
   wrapped,
 } from "../document/manipulation.js";
-import { middle } from "../document/placing.js";
+import { middle, union } from "../document/placing.js";
 import { HANDLED } from "../document/ui-state.js";
 import { watchDrags } from "../lib/drag.js";
-import { at } from "../lib/patch.js";
+import { at, pointer, put } from "../lib/patch.js";
 import { add, scale, subtract } from "../lib/vector.js";
 import { NAMES, WORLD, metresPerPixel, moving, rotating, scaling } from "./handle-drags.js";
 import { drawHandles } from "./handle-shapes.js";
@@ -56,6 +56,16 @@ export class Handles {
     return at(this.acts.state.scene, this.#thing);
   }
 
+  // What is changed together: the selection, and shapes and lights that are selected with it and not locked.
+  get #things() {
+    const own = this.#thing;
+    const isIts = (thing) => /^\/(shapes|lights)\//.test(thing);
+    const { selection } = this.acts;
+    if (!isIts(own) || !selection.includes(own)) return [own];
+    const free = (thing) => thing !== own && isIts(thing) && !isOn(this.acts.state, "locked", [thing]);
+    return [own, ...selection.filter((thing) => free(thing) && at(this.acts.state.scene, thing))];
+  }
+
   get #isEnvironment() {
     return this.#thing === "/environment";
   }
@@ -66,14 +76,20 @@ export class Handles {
     const tool = this.tool();
     if (!HANDLED.includes(tool) || !document || isOn(this.acts.state, "locked", [this.#thing])) return false;
     if (this.#isEnvironment) return tool === "rotate";
-    if (this.#thing.startsWith("/shapes/")) return true;
+    if (this.#thing.startsWith("/shapes/") || this.#things.length > 1) return true;
     if (!this.#thing.startsWith("/lights/")) return false;
     return { move: Boolean(document.position), rotate: Boolean(document.direction), scale: false }[tool];
   }
 
-  // {low, high} of a shape, or null: of anything else, and while it is not known.
+  // {low, high} of the selected shape, or of all that is selected, or null: of a light alone, and while it is not known.
   #box() {
-    return this.#thing.startsWith("/shapes/") ? ownBox(this.#document) : null;
+    const things = this.#things;
+    if (things.length === 1) return this.#thing.startsWith("/shapes/") ? ownBox(this.#document) : null;
+    const point = ({ position }) => (position ? { low: position, high: position } : null);
+    const boxes = things
+      .map((thing) => at(this.acts.state.scene, thing))
+      .map((each) => (isLight(each) ? point : ownBox)(each));
+    return union(boxes.filter(Boolean));
   }
 
   // The point about which the selection turns, or null while that is not known.
@@ -111,7 +127,7 @@ export class Handles {
   }
 
   get #axes() {
-    return this.tool() === "scale" ? ownAxes(this.#document) : WORLD;
+    return this.tool() === "scale" && this.#things.length === 1 ? ownAxes(this.#document) : WORLD;
   }
 
   // A file of triangles that was not uploaded here is measured in the picture.
@@ -126,10 +142,17 @@ export class Handles {
     this.#refresh();
   }
 
-  // Takes the changed thing into the scene; the changes of one gesture are one step of undo.
-  #put(document, gesture) {
-    if (this.#isEnvironment) this.acts.edit("/scene/environment/rotation", document.rotation, gesture);
-    else this.acts.edit(`/scene${this.#thing}`, document, gesture);
+  // Takes all that is selected into the scene as `change` makes it of what it was in `before`; the changes of one gesture
+  // are one step of undo.
+  #put(before, change, gesture) {
+    const changed = (thing) => change(at(before, thing));
+    if (this.#isEnvironment) {
+      this.acts.edit("/scene/environment/rotation", changed(this.#thing).rotation, gesture);
+      return;
+    }
+    this.acts.forgive();
+    const next = this.#things.reduce((state, thing) => put(state, `/scene${thing}`, changed(thing)), this.acts.state);
+    this.acts.change({ scene: next.scene }, gesture);
   }
 
   #turned(document, axis, degrees, pivot) {
@@ -145,7 +168,7 @@ export class Handles {
     if (!handle || event.altKey || !pivot) return null;
     const tool = this.tool();
     const from = this.#place(event);
-    const before = this.#document;
+    const before = this.acts.state.scene;
     const follow = { move: this.#moving, rotate: this.#rotating, scale: this.#scaling }[tool].call(
       this,
       handle,
@@ -160,12 +183,12 @@ export class Handles {
       move: (now) => {
         isMoved ||= !isStill(now);
         if (!isMoved) return;
-        const { document, words } = follow(this.#place(now), now.ctrlKey || now.metaKey);
+        const { change, words } = follow(this.#place(now), now.ctrlKey || now.metaKey);
         this.#words = words;
-        this.#put(document, gesture);
+        this.#put(before, change, gesture);
       },
       end: (isCancelled) => {
-        if (isCancelled && isMoved) this.#put(before, gesture);
+        if (isCancelled && isMoved) this.#put(before, (document) => document, gesture);
         else if (isMoved) this.say(this.#words);
         this.#dragged = null;
         this.#words = "";
@@ -182,7 +205,7 @@ export class Handles {
   }
 
   #moving(handle, pivot, from) {
-    const before = this.#document;
+    const before = this.#box();
     const follow = moving(this.#view, pivot, handle, from);
     const isLevel = ["X", "Z", "plane Y"].includes(handle);
     return (place, isFree) => {
@@ -192,12 +215,11 @@ export class Handles {
       const by = isNear ? add(offset, [0, drop, 0]) : offset;
       const parts = NAMES.map((name, k) => [name, by[k]]).filter(([, far]) => Math.abs(far) > 1e-9);
       const words = parts.map(([name, far]) => `${name} ${far > 0 ? "+" : ""}${short(far)}`).join("  ");
-      return { document: shifted(before, by), words: isNear ? `${words}  on the ground` : words };
+      return { change: (document) => shifted(document, by), words: isNear ? `${words}  on the ground` : words };
     };
   }
 
   #rotating(handle, pivot, from) {
-    const before = this.#document;
     const { position } = this.acts.camera;
     const away = subtract(position, pivot);
     const axis = WORLD[NAMES.indexOf(handle)] ?? scale(away, 1 / Math.hypot(...away));
@@ -205,36 +227,38 @@ export class Handles {
     return (place, isStepped) => {
       const degrees = follow(place);
       const by = isStepped ? TURN * Math.round(degrees / TURN) : Number(degrees.toFixed(1));
-      return { document: this.#turned(before, axis, by, pivot), words: `${short(by)}°` };
+      return { change: (document) => this.#turned(document, axis, by, pivot), words: `${short(by)}°` };
     };
   }
 
   #scaling(handle, pivot, from) {
-    const before = this.#document;
     const axis = this.#axes[NAMES.indexOf(handle)];
     const follow = scaling(this.#view, pivot, axis, from);
     return (place) => {
       const factor = Number(follow(place).toPrecision(3));
       const map = axis ? stretching(axis, factor) : growing(factor);
-      return { document: mapped(before, map, pivot), words: `${axis ? `${handle} ` : ""}× ${short(factor)}` };
+      return {
+        change: (document) => mapped(document, map, pivot),
+        words: `${axis ? `${handle} ` : ""}× ${short(factor)}`,
+      };
     };
   }
 
-  // How far a shape has to rise, from an offset, to stand on the ground; null where there is none.
-  #drop(document, offset = [0, 0, 0]) {
-    const own = isLight(document) ? null : ownBox(document);
+  // How far what has this box has to rise, from an offset, to stand on the ground; null where there is none.
+  #drop(own, offset = [0, 0, 0]) {
     if (!own) return null;
-    const others = this.acts.state.scene.shapes.filter((each) => each !== this.#document).map(ownBox);
+    const things = this.#things;
+    const others = this.acts.state.scene.shapes.filter((_, i) => !things.includes(pointer("shapes", i))).map(ownBox);
     const box = { low: add(own.low, offset), high: add(own.high, offset) };
     const ground = groundUnder(box, others.filter(Boolean));
     return ground === null ? null : ground - box.low[1];
   }
 
-  // Sets the selected shape down on what is under it.
+  // Sets what is selected down on what is under it.
   land() {
-    const drop = this.#thing.startsWith("/shapes/") ? this.#drop(this.#document) : null;
+    const drop = this.#drop(this.#box());
     if (drop === null) return this.say("There is no ground under it");
-    this.#put(shifted(this.#document, [0, drop, 0]), null);
+    this.#put(this.acts.state.scene, (document) => shifted(document, [0, drop, 0]), null);
     this.say("It stands on the ground");
   }
 
@@ -242,7 +266,7 @@ export class Handles {
 
   // Steps to the right, to the back and up, as one sees it. A turn goes about the axis that the arrow would roll over.
   step(right, back, up) {
-    const document = this.#document;
+    const before = this.acts.state.scene;
     const pivot = this.#pivot();
     if (!pivot) return this.#measure();
     const frame = axes(this.acts.camera);
@@ -253,13 +277,13 @@ export class Handles {
       const box = this.#box();
       const size = box ? Math.max(...subtract(box.high, box.low)) : frame.distance / 4;
       const way = add(add(scale(aside, right), scale(away, back)), [0, up, 0]);
-      this.#put(shifted(document, scale(way, STEP.move * size)), gesture);
+      this.#put(before, (document) => shifted(document, scale(way, STEP.move * size)), gesture);
     } else if (tool === "rotate") {
       const [axis, steps] = right ? [[0, 1, 0], right] : back ? [aside, -back] : [away, up];
-      this.#put(this.#turned(document, axis, STEP.rotate * steps, pivot), gesture);
+      this.#put(before, (document) => this.#turned(document, axis, STEP.rotate * steps, pivot), gesture);
     } else {
       const steps = right + back + up;
-      this.#put(mapped(document, growing(1 + STEP.scale * steps), pivot), gesture);
+      this.#put(before, (document) => mapped(document, growing(1 + STEP.scale * steps), pivot), gesture);
     }
     this.#tell(tool);
   }
