@@ -94,7 +94,8 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
          ("click", "#lobe >> text=By lobe", "")],
     ),
     "editor-scene": ((1280, 800), "light", [
-        ("click", "#outline-list [data-thing='/environment']", ""), ("key", "h", ""), ("key", "7", ""),
+        ("click", "#outline-list [data-thing='/environment']", ""), ("click", "#view", ""),
+        ("click", "#show-histogram", ""), ("key", "Escape", ""), ("key", "7", ""),
     ]),
     "editor-render": (
         (1280, 800), "light",
