@@ -144,6 +144,21 @@ export function laterParts({
     { complain, arrived: (made) => page.info && made.show() },
   );
 
+  const sweep = new OnDemand(
+    async () => {
+      const [module] = await Promise.all([import("./panels/sweep.js"), useSheet("sweep.css")]);
+      return module;
+    },
+    ({ Sweep }) => new Sweep({ schema, page, acts: editor, say }),
+    { complain },
+  );
+  let touched; // the parameter that had the focus last
+  find("material-form").addEventListener("focusin", ({ target }) => {
+    touched = target.closest("[data-field]")?.dataset.field ?? touched;
+  });
+  sweep.nears(find("sweep-material"));
+  find("sweep-material").addEventListener("click", () => sweep.calls("open")(touched));
+
   const all = [textures, adder, importer, menus, finals, controller.tools];
   return {
     comparison,

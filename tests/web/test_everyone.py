@@ -50,6 +50,10 @@ def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any
         editor.page.keyboard.press("Escape")
     editor.unfold()
     assert findings(editor) == [], "all that a material has"
+    editor.act("sweep-material")
+    editor.page.wait_for_selector(".sweep [role=option]")
+    assert findings(editor) == [], "a parameter at several values"
+    editor.page.keyboard.press("Escape")
     editor.page.click("[data-field=roughness] .image")
     assert findings(editor) == [], "what is offered as an image"
     editor.page.keyboard.press("Escape")

@@ -40,7 +40,7 @@ const hash = async (document) => {
 const GREY = 0.4;
 const isColor = (value) => HEX.test(value) || (Array.isArray(value) && value.length === 3);
 
-function show(image, blob) {
+export function show(image, blob) {
   const url = URL.createObjectURL(blob);
   image.src = url;
   image.addEventListener("load", () => URL.revokeObjectURL(url), { once: true });

@@ -106,6 +106,12 @@ export const prepareImage = async (id, query) => {
 // Cancels one that has not ended; its picture so far stays. Deletes one that has.
 export const deleteRender = (id, options) => ask("DELETE", `renders/${id}`, options);
 
+// Renders of one scene along axes: {scene, settings, over, ...} gives {id, renders: N}.
+export const startBatch = async (order) => (await ask("POST", "batches", json(order))).json();
+export const batchStatus = (id) => get(`batches/${id}`);
+// Deletes one that has ended, with its renders. `keepalive`: the page may be closed meanwhile.
+export const cancelBatch = (id) => ask("DELETE", `batches/${id}`, { keepalive: true });
+
 // What lies between two pictures, each {scene, settings} or the id of a render: {verdict, blob}, the latter a map of "p",
 // "flip" or what else the server draws. More samples are taken while it is undecided; `signal` ends that.
 export async function compareMap(a, b, map, signal) {
