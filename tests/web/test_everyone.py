@@ -129,7 +129,7 @@ def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, s
 def test_the_keyboard_reaches_everything(editor: Editor) -> None:
     before = editor.settled()
     editor.page.keyboard.press("?")
-    assert editor.page.is_visible("#keys-dialog")
+    editor.page.wait_for_selector("#keys-dialog", state="visible")  # it is fetched for the first key
     assert editor.page.locator("#keys dt").count() > 20
     editor.page.keyboard.press("Escape")
     assert editor.page.is_hidden("#keys-dialog")

@@ -79,7 +79,7 @@ def test_a_material_in_use_is_deleted_for_another(editor: Editor) -> None:
     page = editor.page
     before = editor.settled()
     page.click("#delete-material")
-    assert "One thing is made of it." in editor.text("dialog[open]")
+    assert "One thing is made of it." in editor.text("dialog[open]")  # waits for it
     page.keyboard.press("Escape")
     assert page.is_disabled("#undo"), "nothing was changed"
     page.click("#delete-material")
@@ -94,7 +94,8 @@ def test_a_material_in_use_is_deleted_for_another(editor: Editor) -> None:
     editor.pick("materials", "floor-2")
     assert editor.text("#material-users") == "Nothing is made of it yet."
     page.click("#delete-material")  # nobody has to be asked
-    assert page.locator("dialog[open]").count() == 0 and editor.chosen("materials") == "floor"
+    editor.wait("its end", lambda: editor.chosen("materials") == "floor")
+    assert page.locator("dialog[open]").count() == 0
     for _ in range(4):
         page.keyboard.press("Control+z")
     editor.wait("the ball's material", lambda: not editor.differs(before, 8))
