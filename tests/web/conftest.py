@@ -224,6 +224,7 @@ class Editor:
             button, menu = MENUS[name]
             if not page.is_visible(menu):
                 page.click(button)
+                page.wait_for_selector(menu, state="visible")  # its parts come on demand
         elif name == "film":
             page.click(camera)
             page.click("#tab-properties")

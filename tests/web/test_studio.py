@@ -166,7 +166,7 @@ def test_what_the_header_opens(editor: Editor) -> None:
     page.get_by_role("button", name="Export").click()
     menu = page.get_by_role("menu", name="Export")
     items = [each.get_attribute("aria-label") for each in menu.get_by_role("menuitem").all()]
-    assert items == ["PNG", "PNG, 16 bit", "EXR", "JSON, scene", "JSON, material", "curl"]
+    assert items == ["PNG", "PNG, 16 bit", "EXR", "Share picture", "JSON, scene", "JSON, material", "curl"]
     page.keyboard.press("ArrowDown")
     assert page.evaluate("document.activeElement.getAttribute('aria-label')") == "PNG, 16 bit"
     page.keyboard.press("Escape")

@@ -215,6 +215,7 @@ def test_the_materials_are_served_and_a_restart_has_them(server: Server) -> None
     assert found["warnings"] == answer.json()["warnings"]
     saved = {name: found[name] for name in ("materials", "textures")}
     assert server.http.put("/v1/documents/materials/oak", json=saved).status_code in (200, 201, 204)
+    server.http.delete("/v1/documents/materials/oak")
     image = found["textures"]["Oak_Color"]["asset"]
     assert server.http.get(f"/v1/assets/{image}/materials").status_code == 404
     assert server.http.get(f"/v1/assets/{answer.json()['id']}/scene").status_code == 404

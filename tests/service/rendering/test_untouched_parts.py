@@ -37,6 +37,7 @@ TURN = [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
 SHAPES = [
     {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m", "transform": {"translate": [1, 0, 0]}},
     {"type": "quad", "origin": [-3, -1, 3], "u": [6, 0, 0], "v": [0, 0, -6], "material": "m"},
+    {"type": "disk", "center": [0, 3, 0], "normal": [0, -1, 0], "radius": 1, "material": "m"},
     {"type": "box", "min": [2, 0, 0], "max": [3, 1, 1], "material": "grey", "transform": {"matrix": TURN}},
     MESH, {"type": "mesh", "asset": SOLID, "material": "grey"},
 ]  # fmt: skip
