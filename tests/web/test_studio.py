@@ -32,7 +32,7 @@ def at(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iter
 
 def names(editor: Editor, listbox: str) -> list[str]:
     options = editor.page.get_by_role("listbox", name=listbox, exact=True).get_by_role("option")
-    return [str(each.get_attribute("aria-label")) for each in options.all()]
+    return list(options.evaluate_all("all => all.map((each) => each.getAttribute('aria-label'))"))
 
 
 def test_materials_are_pictures_on_the_shelf(editor: Editor) -> None:
@@ -51,7 +51,7 @@ def test_materials_are_pictures_on_the_shelf(editor: Editor) -> None:
     assert document(editor)["shapes"][1]["material"] == "ground"
     own.get_by_role("option", name="material", exact=True).click()
     page.keyboard.press("Delete")
-    assert "material" not in names(editor, "Materials"), "nothing was made of it"
+    editor.wait("its end, as nothing was made of it", lambda: "material" not in names(editor, "Materials"))
     assert len(document(editor)["shapes"]) == 2, "the things stay"
 
 
