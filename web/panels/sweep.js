@@ -83,7 +83,10 @@ export class Sweep {
     if (!offered.length) return this.acts.complain(new Error("This material has no parameter with a range."));
     const id = freshId("sweep");
     const select = element("select", { id: `${id}-of`, onchange: () => sweep() }, ...options(offered));
-    select.value = offered.some((field) => field.name === name) ? name : offered[0].name;
+    // Else one of the fold that is open first, as an artist meets it.
+    const wished =
+      offered.find((field) => field.name === name) ?? offered.find(({ group }) => group === own[0].group);
+    select.value = (wished ?? offered[0]).name;
     const row = element("div", { class: "sweep" });
     const status = element("p", { class: "note", role: "status" });
     const trouble = element("p", { class: "trouble", role: "alert", hidden: true });
