@@ -244,9 +244,10 @@ class Editor:
         self.page.click(f"#{id}")
 
     def unfold(self) -> None:
-        """Open all parts of the material."""
+        """Open all parts of the material, those too that a change still on its way brings anew."""
         shut = "details.fold:not([open]) > summary"
-        self.page.eval_on_selector_all(shut, "all => all.forEach((each) => each.click())")
+        click = "all => { all.forEach((each) => each.click()); return all.length === 0; }"
+        self.wait("the parts to open", lambda: self.page.locator(shut).evaluate_all(click))
 
     def pick(self, shelf: str, value: str) -> None:
         """Choose a picture on the shelf: of the scene's "materials", the "library", "environments" or "scenes"."""

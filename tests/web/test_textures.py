@@ -127,6 +127,7 @@ def test_every_place_for_an_image_is_reached_by_keyboard(editor: Editor) -> None
 
     page.locator("[data-field=normal_map] .choose").focus()
     page.keyboard.press("Enter")
+    page.wait_for_selector("dialog[open] .tile:focus")  # the sheet is fetched when it is asked for
     with page.expect_file_chooser() as asked:
         page.keyboard.press("Enter")  # the first of what is offered
     asked.value.set_files({"name": "halves.png", "mimeType": "image/png", "buffer": halves()})
