@@ -11,7 +11,6 @@ extensions            which extensions are supported, and the warnings about the
 accessors             accessors -> arrays
 draco                 meshes that are compressed with KHR_draco_mesh_compression
 nodes                 nodes and their transforms
-placements            the transforms of all meshes, for the camera and the metering
 primitives            primitives -> triangles with normals, colours and texture coordinates
 deform                morph targets and skins, in the pose that the file shows
 materials             materials -> the document's
@@ -22,5 +21,4 @@ textures              textures and samplers -> the document's
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
 lights_and_camera     lights and cameras -> the document's
-metering              the exposure that suits a file
 """
