@@ -8,6 +8,7 @@ problems   the errors that callers see, with their HTTP statuses
 colorimetry  sRGB and linear Rec.709
 views      the names of AOVs and tone maps
 quality    quality presets, and settings with every knob resolved
+file_formats  the formats that are read and written
 state      what the routes share
 scene      the document as a person writes it
 pack       a document -> the renderer's arrays

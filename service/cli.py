@@ -236,6 +236,9 @@ def _import(command: argparse.ArgumentParser) -> None:
     )
     text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
     command.add_argument("-o", "--output", required=True, metavar="SCENE.json", help=text)
+    command.add_argument("--variant", metavar="NAME", help="a glTF file's materials in this variant")
+    command.add_argument("--animation", metavar="NAME", help="a glTF file as this animation has it")
+    command.add_argument("--time", type=float, metavar="S", help="at this time in the animation (default: its start)")
     _asset_root(command)
 
 

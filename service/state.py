@@ -9,19 +9,17 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib import metadata
-from typing import Any, get_args
+from typing import Any
 
 from starlette.requests import HTTPConnection
 
-from service.assets.formats import KINDS
-from service.assets.types import Kind
+from service import file_formats
 from service.batches.batch import Batch
 from service.batches.members import Members
 from service.batches.queue import BatchQueue
 from service.callbacks.queue import Callbacks
 from service.config import Config
 from service.http.downloads import Downloads
-from service.images import animation
 from service.operation.readiness import SOFTWARE, Readiness
 from service.operation.traffic import Traffic
 from service.pack import Packed
@@ -42,20 +40,12 @@ from service.streams.sessions import Sessions
 from service.system.executors import packing
 from service.system.memory import MemoryBudget
 from service.system.shares import Shares
-from service.views import FileFormat
 
 MESSAGE_BYTES = 1 << 20  # of one message on a stream: larger geometry is uploaded as an asset
 MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
 GPU_S = 60.0  # how long the start waits for one, where SUNBOX_REQUIRE_GPU is set
 FAREWELL_S = 4.0  # how long the end waits for slow clients to read the last messages
-
-# What is read and written, by what it is.
-FORMATS = {
-    "pictures": list(get_args(FileFormat)),
-    "animations": list(animation.FORMATS),
-    **{f"{kind}s": [name for name, each in KINDS.items() if each == kind] for kind in get_args(Kind)},
-}
 
 log = logging.getLogger(__name__)
 
@@ -112,7 +102,7 @@ class AppState:
             "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),
-            "formats": FORMATS,
+            "formats": file_formats.told(),
         }
 
     async def resume_renders(self) -> None:

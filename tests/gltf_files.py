@@ -61,6 +61,21 @@ class Gltf:
             self.tree["scenes"][0]["nodes"].append(index)
         return index
 
+    def animation(self, name: str, *channels: tuple[int, str, str, Any, Any]) -> int:
+        """Of channels `(node, path, interpolation, times, values)`."""
+        samplers = [
+            {
+                "input": self.accessor(np.asarray(times, "<f4")),
+                "interpolation": how,
+                "output": self.accessor(np.asarray(values, "<f4")),
+            }
+            for _, _, how, times, values in channels
+        ]
+        targets = [
+            {"sampler": k, "target": {"node": node, "path": path}} for k, (node, path, *_) in enumerate(channels)
+        ]
+        return self.add("animations", {"name": name, "samplers": samplers, "channels": targets})
+
     def of(self, material: dict[str, Any]) -> Gltf:
         """This, with a quad of the material."""
         self.node(mesh=self.mesh(self.primitive(material=self.add("materials", material))))

@@ -43,6 +43,7 @@ LAYERS = [
     {"service.quality", "service.presets"},
     {"service.images"},
     {"service.assets"},
+    {"service.file_formats"},
     {"service.storage"},
     {"service.pack"},
     {"service.requests"},

@@ -3,6 +3,7 @@
 types         meshes, images, scene files, limits, and the protocol by which packing loads assets
 errors        ParseError, which readers raise
 formats       the formats, and how a file's format is recognised
+limits        the bounds on assets, as the configuration sets them
 source        the bytes of an upload, in memory or in a file
 store         uploaded assets
 rendered      uploaded pictures that Sunbox rendered, with what their noise is
@@ -13,6 +14,7 @@ integrity     whether the bytes on the disk still match their hash
 cache         parsed assets in memory
 local_files   assets that are files beside a scene
 scene_import  a whole scene's file -> a document whose references are assets
+posing        a scene's file with other materials, or at a time of its animation
 sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF

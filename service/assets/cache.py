@@ -7,10 +7,10 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from service.assets.errors import ParseError
+from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.types import AssetLimits, ImageData, MeshData
-from service.problems import AssetError
+from service.problems import AssetError, NotProvided
 
 Parsed = MeshData | ImageData
 
@@ -98,8 +98,10 @@ def as_image(parsed: Parsed, name: str) -> ImageData:
     return parsed
 
 
-def refused(name: str, error: ParseError) -> AssetError:
-    return AssetError(f"{name}: {error}", error.pointer)
+def refused(name: str, error: ParseError) -> AssetError | NotProvided:
+    """What a caller is told of a file that is not read."""
+    detail = f"{name}: {error}"
+    return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
 
 
 def _bytes(parsed: Parsed) -> int:

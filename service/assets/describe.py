@@ -9,8 +9,9 @@ def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
     warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
     if isinstance(parsed, ImageData):
         height, width, channels = parsed.pixels.shape
-        size_ = {"width": width, "height": height, "channels": channels}
-        return AssetInfo(id, KINDS[format], format, size, **size_, warnings=warnings)
+        return AssetInfo(id, KINDS[format], format, size, width, height, channels, warnings=warnings)
     bounds = [corner.tolist() for corner in parsed.bounds]
-    counts = {"vertices": len(parsed.vertices), "triangles": len(parsed.faces)}
-    return AssetInfo(id, KINDS[format], format, size, **counts, bounds=bounds, warnings=warnings)
+    vertices, triangles = len(parsed.vertices), len(parsed.faces)
+    return AssetInfo(
+        id, KINDS[format], format, size, vertices=vertices, triangles=triangles, bounds=bounds, warnings=warnings
+    )

@@ -11,3 +11,7 @@ class ParseError(Exception):
         super().__init__(f"{pointer}: {detail}" if pointer else detail)
         self.detail = detail
         self.pointer = pointer
+
+
+class MissingExtra(ParseError):
+    """A file was refused because the package that reads it is not installed; the message names the extra."""

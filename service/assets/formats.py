@@ -2,9 +2,16 @@
 
 import re
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
+from functools import cache
+from importlib.util import find_spec
 from mmap import mmap
 
 from service.assets.types import Kind
+
+COMPRESSIONS = ("draco",)  # of meshes and images inside glTF files
+
+# What installs the package that a format needs, and the module by which it is known to be there.
+PACKAGES: dict[str, tuple[str, str]] = {}
 
 KINDS: dict[str, Kind] = {
     "obj": "mesh",
@@ -59,6 +66,12 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
+
+
+@cache
+def missing() -> dict[str, str]:
+    """The formats that cannot be read here, with what would have to be installed."""
+    return {name: package for name, (package, module) in PACKAGES.items() if find_spec(module) is None}
 
 
 def text(data: bytes) -> bytes:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from service.assets.types import Kind, SceneFile, ScenePart
-from service.problems import AssetError, InvalidDocument
+from service.assets.types import Kind, Pose, SceneFile, ScenePart
+from service.problems import AssetError, InvalidDocument, NotFound
 
-IMPORTER = 4  # raised when files must be imported anew, because their documents or warnings change
+IMPORTER = 5  # raised when files must be imported anew, because their documents or warnings change
 PART = re.compile(r"part:(\d+)")
 
 
@@ -25,6 +25,18 @@ class Imported:
     exposure: float | None = None  # in stops, that suits these lights; None: 0 does
     aspect_ratio: float | None = None  # of the picture of its camera, width over height
     importer: int = 0  # the IMPORTER that wrote it
+    variants: list[str] = field(default_factory=list)  # of its materials, by name
+    animations: list[dict[str, Any]] = field(default_factory=list)  # [{name, duration}], s
+
+    def check(self, pose: Pose) -> None:
+        """Raise NotFound where the file does not have what a pose names."""
+        from service.scene.validation import among
+
+        moves = [each["name"] for each in self.animations]
+        for kind, name, known in (("variant", pose.variant, self.variants), ("animation", pose.animation, moves)):
+            if name is not None and name not in known:
+                there = f"it has {among(known)}" if known else f"the file has no {kind}s"
+                raise NotFound(f"there is no {kind} {name[:100]!r}; {there}", f"/{kind}")
 
     @classmethod
     def read(cls, text: bytes) -> Imported:
@@ -81,4 +93,7 @@ def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
         parse_scene(document)
     except InvalidDocument as error:
         raise AssetError(f"as a scene it has a mistake at {error.errors[0]}") from None
-    return Imported(document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER)
+    animations = [asdict(each) for each in file.animations]
+    return Imported(
+        document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER, file.variants, animations
+    )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO
 
 from service.assets.cache import Parsed, ParsedCache, as_image, as_mesh, refused
 from service.assets.describe import describe
@@ -17,10 +17,11 @@ from service.assets.errors import ParseError
 from service.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
 from service.assets.formats import KINDS, sniff
 from service.assets.integrity import Integrity, damaged
+from service.assets.limits import HasLimits, asset_limits
 from service.assets.scene_import import Imported, take_apart
 from service.assets.scenes.plain_mesh import plain_scene
 from service.assets.source import Source, digest, for_sandbox, format_of, length
-from service.assets.types import AssetInfo, AssetLimits, ImageData, Kind, MeshData, ScenePart
+from service.assets.types import AssetInfo, ImageData, Kind, MeshData, SceneFile, ScenePart
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from service.system.confined import Rights
 from service.system.disk_usage import Usage, expected
@@ -40,25 +41,6 @@ RECORD_BYTES = 512  # about the size of an asset's record
 Room = Callable[[Usage], AbstractContextManager[None]]
 
 
-class HasLimits(Protocol):
-    """The part of the configuration that concerns assets."""
-
-    @property
-    def max_triangles(self) -> int: ...
-
-    @property
-    def max_texels(self) -> int: ...
-
-    @property
-    def max_asset(self) -> int: ...
-
-    @property
-    def parse_seconds(self) -> float: ...
-
-    @property
-    def parse_memory(self) -> int: ...
-
-
 class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
@@ -73,11 +55,11 @@ class AssetStore:
         builtin: Callable[[], dict[str, bytes]] | None = None,
         room: Room = lambda size: nullcontext(),
     ) -> None:
-        self.loader = ParsedCache(_limits(config))
+        self.loader = ParsedCache(asset_limits(config))
         self._files = AssetFolder(root / "assets")
         self._integrity = Integrity(self._files)
         self._builtin = builtin
-        self._room = room
+        self.room = room
 
     def incoming(self) -> BinaryIO:
         """A file without a name for an upload, deleted when it is closed. Raises Unavailable."""
@@ -115,7 +97,7 @@ class AssetStore:
         if KINDS[format] == "scene":
             return self._import(id, format, data, True, room, title)[0]
         info = self._described(id, format, data)
-        with (room or self._room)(expected((size, RECORD_BYTES))):
+        with (room or self.room)(expected((size, RECORD_BYTES))):
             self._store(info, data)
         return info
 
@@ -223,13 +205,13 @@ class AssetStore:
         size = length(data)
         # References to the parts, which are about as long as a record, are added to the document.
         text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])
-        parts = [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
-        with (room or self._room)(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
-            imported = take_apart(file, self._store_part)
+        with (room or self.room)(expected([text, *sizes_of_parts(file), *((size, RECORD_BYTES) if new else ())])):
+            imported = take_apart(file, self.store_part)
             info = AssetInfo(
                 id, imported.kind, format, size, triangles=file.triangles or None, warnings=imported.warnings or None,
                 exposure=imported.exposure, aspect_ratio=imported.aspect_ratio, bounds=file.bounds,
             )  # fmt: skip
+            info = with_choices(info, imported)
             if new:
                 self._store(info, data, imported)
             else:
@@ -237,7 +219,7 @@ class AssetStore:
                     self._files.put(id, {SCENE: imported.written()})
         return info, imported
 
-    def _store_part(self, part: ScenePart) -> str:
+    def store_part(self, part: ScenePart) -> str:
         """The id of a part of a scene, stored as an asset of its own.
 
         It does not wait for the disk, which takes 15 ms a part: scenes have thousands, and can be imported again.
@@ -347,20 +329,17 @@ class AssetStore:
         return found
 
 
+def sizes_of_parts(file: SceneFile) -> list[int]:
+    """The bytes that the parts of a scene take on the disk."""
+    return [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
+
+
+def with_choices(info: AssetInfo, imported: Imported) -> AssetInfo:
+    return replace(info, variants=imported.variants or None, animations=imported.animations or None)
+
+
 def unknown(id: str) -> NotFound:
     return NotFound(f"there is no asset {id[:100]!r} here; upload it first")
-
-
-def _limits(config: HasLimits | None) -> AssetLimits:
-    if config is None:
-        return AssetLimits()
-    return AssetLimits(
-        max_triangles=config.max_triangles,
-        max_texels=config.max_texels,
-        max_file=config.max_asset,
-        seconds=config.parse_seconds,
-        memory=config.parse_memory,
-    )
 
 
 def _format(data: bytes) -> str:

@@ -1,6 +1,6 @@
 """The results of reading assets, and the limits. This module imports nothing of the service."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -89,6 +89,27 @@ class ScenePart:
 
 
 @dataclass(frozen=True)
+class Animation:
+    """One of the animations of a scene's file."""
+
+    name: str
+    duration: float  # s; it begins at 0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """How a scene's file is shown, where that is not as it was saved. The names are ones that it has."""
+
+    variant: str | None = None  # of its materials
+    animation: str | None = None
+    time: float = 0.0  # s, in the animation
+
+    @property
+    def is_default(self) -> bool:
+        return self.variant is None and self.animation is None
+
+
+@dataclass(frozen=True)
 class SceneFile:
     """A file that is a whole scene. `document` refers to `parts[k]` as "part:k".
 
@@ -103,6 +124,8 @@ class SceneFile:
     exposure: float | None = None  # stops that suit its lights; None: 0 does
     aspect_ratio: float | None = None  # of its camera's picture, width over height
     bounds: list[list[float]] | None = None  # of its triangles where they stand: least and greatest x, y, z, m
+    variants: list[str] = field(default_factory=list)  # of its materials
+    animations: list[Animation] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -126,6 +149,8 @@ class AssetInfo:
     warnings: list[dict[str, Any]] | None = None
     exposure: float | None = None  # in stops, that suits a scene's lights; None: 0 does
     aspect_ratio: float | None = None  # of the picture of a scene's camera, width over height
+    variants: list[str] | None = None  # of a scene's materials, by name
+    animations: list[dict[str, Any]] | None = None  # of a scene: [{name, duration}], s
 
 
 @dataclass(frozen=True)

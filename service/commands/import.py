@@ -5,14 +5,20 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import tempfile
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from service.commands import BadInput, files
 from service.commands.configuration import configuration
 from service.commands.documents import asset_folders, picture_size, read_settings, refusals
+
+if TYPE_CHECKING:
+    from service.assets.scene_import import Imported
+    from service.assets.types import Pose
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -21,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     from service import presets
     from service.assets import AssetStore, FileAssets
+    from service.assets.types import Pose
     from service.commands.models import import_model, is_model, zipped_images
     from service.scene import references
 
@@ -29,6 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise BadInput(
             f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip, nor a folder of textures"
         )
+    if arguments.time is not None and arguments.animation is None:
+        raise BadInput("--time: needs --animation beside it")
+    if arguments.time is not None and not math.isfinite(arguments.time):
+        raise BadInput("--time: must be a finite number of seconds")
+    pose = Pose(arguments.variant, arguments.animation, arguments.time or 0.0)
     folder = target.with_suffix(".assets")
     with (
         tempfile.TemporaryDirectory(prefix="sunbox-") as scratch,
@@ -36,7 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
         FileAssets(source.parent, asset_folders(arguments.asset_root), store) as beside,
         refusals(),
     ):
-        model = import_model(source, data, store, beside)
+        model = import_model(source, data, store, beside, pose)
+        _tell_choices(model, pose)
         document = model.scene(presets.default_environment())
         if model.kind == "materials":
             document = {name: document[name] for name in ("materials", "textures")}
@@ -63,3 +76,12 @@ def run(arguments: argparse.Namespace) -> int:
         document = references.renamed(document, named.__getitem__)
     files.write(target, (json.dumps(document, indent=1) + "\n").encode())
     return 0
+
+
+def _tell_choices(model: Imported, pose: Pose) -> None:
+    """The variants and animations that were not asked for, on stderr."""
+    if model.variants and pose.variant is None:
+        print(f"note: --variant NAME takes another variant: {', '.join(model.variants)}", file=sys.stderr)
+    if model.animations and pose.animation is None:
+        told = ", ".join(f"{each['name']} ({each['duration']:.3g} s)" for each in model.animations)
+        print(f"note: --animation NAME --time S poses the model: {told}", file=sys.stderr)

@@ -26,6 +26,7 @@ from service.problems import AssetError
 if TYPE_CHECKING:
     from service.assets import AssetStore, FileAssets
     from service.assets.scene_import import Imported
+    from service.assets.types import Pose
 
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip")
@@ -44,16 +45,20 @@ def is_model(path: Path, data: bytes) -> bool:
     return isinstance(tree, dict) and isinstance(tree.get("asset"), dict)
 
 
-def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) -> Imported:
-    """The model as a document whose references are assets of `store`. Prints warnings. Raises ServiceError."""
+def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, pose: Pose | None = None) -> Imported:
+    """The model, perhaps in a pose, as a document whose references are assets of `store`. Prints warnings. Raises
+    ServiceError."""
     format = sniff(data, filename=path.name)
     title = None
     if format == "obj":
         data, title = _zipped(path, data, files), "the OBJ file"
     elif format not in WHOLE:
         data, format = _embedded(data, files), "gltf"
+    from service.assets.posing import posed_scene
+    from service.assets.types import Pose
+
     info = store.add(data, filename=f"model.{format}", title=title)
-    imported = store.materials(info.id) if info.kind == "materials" else store.scene(info.id)
+    imported = store.materials(info.id) if info.kind == "materials" else posed_scene(store, info.id, pose or Pose())
     for warning in imported.warnings:
         place = f"{warning['pointer']}: " if warning["pointer"] else ""
         print(f"warning: {place}{warning['detail']}", file=sys.stderr)

@@ -13,6 +13,7 @@ stream           the stream's WebSocket
 materials        a material turned into another model
 bsdf             values of a material's BSDF
 assets           uploads
+asset_answers    what uploads are answered
 documents        saved scenes and materials
 presets          built-in documents
 metrics          /metrics, in Prometheus' format

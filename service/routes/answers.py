@@ -10,7 +10,6 @@ from fastapi import Path
 from pydantic import BaseModel, Field
 
 from service import presets
-from service.assets.types import Kind
 from service.ipc.messages import Reason
 from service.problems import ANSWERS
 from service.renders.store.record import State
@@ -82,6 +81,19 @@ class Memory(BaseModel):
     used: dict[str, int] = Field(description="Bytes, by what is in it.")
 
 
+class Formats(BaseModel):
+    """Of files."""
+
+    pictures: list[str] = Field(description="Are written.")
+    animations: list[str] = Field(description="Are written.")
+    meshes: list[str] = Field(description="Are read.")
+    scenes: list[str] = Field(description="Are read as whole scenes.")
+    images: list[str] = Field(description="Are read, for textures and environments.")
+    materials: list[str] = Field(description="Are read as materials.")
+    compressions: list[str] = Field(description="Are read inside glTF files.")
+    missing: dict[str, str] = Field(description="Formats that this server lacks a package for, with its name.")
+
+
 class Info(BaseModel):
     version: str
     renderer: dict[str, Any] | None = Field(
@@ -92,7 +104,7 @@ class Info(BaseModel):
     memory: Memory
     limits: dict[str, Any] = Field(description="What may be sent, by the names of the settings.")
     quality: dict[str, Any] = Field(description="The quality presets, with what they cost.")
-    formats: dict[str, list[str]] = Field(description="What is written (pictures, animations) and read (the others).")
+    formats: Formats
 
 
 class Schemas(BaseModel):
@@ -154,45 +166,6 @@ class Batch(BaseModel):
     counts: dict[State, int] = Field(description="Renders in each state.")
     renders: list[BatchMember] = Field(description="In their order: the last axis runs fastest.")
     eta_s: float | None = Field(description="As if no other renders waited; null until one of them has ended.")
-
-
-class AssetWarning(BaseModel):
-    pointer: str = Field(
-        description="The first place: RFC 6901 into the file's own JSON, or FILE:LINE of a zipped OBJ; may be empty."
-    )
-    detail: str
-    count: int | None = Field(None, description="How many places; not there where the pointer is the only one.")
-
-
-class Asset(BaseModel):
-    id: str
-    kind: Kind
-    format: str
-    bytes: int
-    width: int | None = Field(None, description="Of an image, texels.")
-    height: int | None = Field(None, description="Of an image, texels.")
-    channels: int | None = Field(None, description="Of an image.")
-    vertices: int | None = Field(None, description="Of a mesh.")
-    triangles: int | None = Field(None, description="Of a mesh or a scene.")
-    bounds: list[list[float]] | None = Field(None, description="Of a mesh or a scene: least and greatest x, y, z, m.")
-    warnings: list[AssetWarning] = Field(
-        description="What is odd about the file, and what it asks for and does not get."
-    )
-    exposure: float | None = Field(
-        None,
-        description="Of a scene whose own lights expose the picture more than 4 stops from middle grey: the exposure "
-        "in stops that suits them, metered from the logarithmic mean of the luminance in the camera's picture. "
-        "Photometric lights, such as Blender exports, need about -10.",
-    )
-    aspect_ratio: float | None = Field(
-        None, description="Of a scene whose camera says it: the width of its picture over the height."
-    )
-
-
-class MaterialSet(BaseModel):
-    materials: dict[str, Any]
-    textures: dict[str, Any] = Field(description="All that the materials show, by name.")
-    warnings: list[AssetWarning] = Field(description="Which of its images are not used, and why.")
 
 
 class ConvertedMaterial(BaseModel):

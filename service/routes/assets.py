@@ -12,14 +12,17 @@ from typing import Annotated, Any, BinaryIO
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict, Field
 
 from service import presets
 from service.assets import AssetInfo
+from service.assets.posing import described, posed_scene
 from service.assets.scene_import import Imported
+from service.assets.types import Pose
 from service.http.downloads import FileAnswer
-from service.problems import UnsupportedMedia
+from service.problems import FieldError, InvalidDocument, UnsupportedMedia
 from service.requests.bodies import SMALL
-from service.routes import answers
+from service.routes import answers, asset_answers
 from service.scene.text import dump_json
 from service.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
@@ -38,7 +41,7 @@ HEADER_BYTES = 4096  # proxies refuse headers that are much longer
     summary="Upload a mesh, an image, a scene (glTF, or a zip of an OBJ with its materials), or a zip of textures",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
-    responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
+    responses=answers.shaped(asset_answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type", "")
@@ -64,7 +67,28 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
                 have(received)
             await asyncio.to_thread(storage.assets.receive, file, chunk)
         info = await (storing_small if received <= SMALL_ASSET else storing)(add, caller)
+    return _described(info)
+
+
+def _described(info: AssetInfo) -> dict[str, Any]:
     return {"warnings": []} | {name: value for name, value in asdict(info).items() if value is not None}
+
+
+class PoseQuery(BaseModel):
+    """How a glTF file is shown, where that is not as it was saved."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    variant: Annotated[str | None, Field(description="Of its materials, by name.")] = None
+    animation: Annotated[str | None, Field(description="By name.")] = None
+    time: Annotated[
+        float | None,
+        Field(ge=-1e9, le=1e9, description="In the animation, s: before its start and after its end as there."),
+    ] = None
+
+    def pose(self) -> Pose:
+        if self.time is not None and self.animation is None:
+            raise InvalidDocument([FieldError("/time", "needs `animation` beside it")])
+        return Pose(self.variant, self.animation, self.time or 0.0)
 
 
 @router.get(
@@ -73,16 +97,17 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
     response_class=JSONResponse,
     responses=answers.SCENE_DOCUMENT | answers.problems(404, 422),
 )
-async def scene(request: Request, id: answers.AssetId) -> Response:
-    """Its references are assets here. The answer to the file's upload has `warnings`, `exposure` and `aspect_ratio`;
-    here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
-    `Sunbox-Aspect-Ratio`, each only where there is something to say."""
+async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuery, Query()]) -> Response:
+    """Its references are assets here. A glTF file's skins, morph targets and nodes are posed as an animation has them
+    at a time; the answer to the file's upload lists its `variants` and `animations`. That answer has `warnings`,
+    `exposure` and `aspect_ratio`, too; here they are in headers: `Sunbox-Warnings` (as much of the list as has room,
+    as JSON), `Sunbox-Exposure` and `Sunbox-Aspect-Ratio`, each only where there is something to say."""
 
-    storage, owner = app_state(request).storage, owner_of(request)
+    storage, owner, pose = app_state(request).storage, owner_of(request), query.pose()
 
     def read() -> tuple[Imported, str]:
         storage.access.check(owner, id)
-        imported = storage.assets.scene(id)
+        imported = posed_scene(storage.assets, id, pose, partial(storage.shares.room, owner))
         storage.shares.imported(owner, id, imported.references())
         return imported, dump_json(imported.scene(presets.default_environment()))
 
@@ -104,7 +129,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     "/{id}/materials",
     summary="The materials of a zip of textures, or of a scene's file, with the textures that they show",
     response_class=JSONResponse,
-    responses=answers.shaped(answers.MaterialSet, "The materials, by name.") | answers.problems(404, 422),
+    responses=answers.shaped(asset_answers.MaterialSet, "The materials, by name.") | answers.problems(404, 422),
 )
 async def materials(request: Request, id: answers.AssetId) -> Response:
     """The images are assets here. What each image of a zip is of is said by the words of its file name."""
@@ -125,12 +150,23 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
 
 @router.get(
     "/{id}",
-    summary="The bytes",
+    summary="The bytes; or what they are, where `Accept` asks for JSON",
     response_class=Response,
-    responses=answers.files("application/octet-stream") | answers.problems(404),
+    responses=asset_answers.ASSET_FILE | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
+    """With `Accept: application/json` the answer to the upload again: kind, size, warnings, and the variants and
+    animations of a scene."""
+
     storage, owner = app_state(request).storage, owner_of(request)
+    accepted = request.headers.get("accept", "*/*").lower()
+    if "application/json" in accepted and "*/*" not in accepted and "octet-stream" not in accepted:
+
+        def describe() -> dict[str, Any]:
+            storage.access.check(owner, id)
+            return _described(described(storage.assets, id))
+
+        return JSONResponse(await storing(describe, caller_of(request)), headers={"vary": "Accept"})
 
     def find(stack: ExitStack) -> bytes | BinaryIO:
         storage.access.check(owner, id)
@@ -140,7 +176,7 @@ async def download(request: Request, id: answers.AssetId) -> Response:
         source = await opening(partial(find, stack), caller_of(request))
         # A shared cache would answer other keys, too.
         cached = FOREVER.format("private" if owner else "public")
-        headers = {"content-disposition": "attachment", "cache-control": cached}
+        headers = {"content-disposition": "attachment", "cache-control": cached, "vary": "Accept"}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)
         # A descriptor of its own: the file stays readable even if the asset is deleted meanwhile.

@@ -59,7 +59,16 @@ INFO: dict[str, Any] = {
     "memory": {"limit": 12638257152, "used": {"scenes": 21545840, "pictures": 267386880}},
     "limits": {"max_pixels": 16777216, "max_body": 268435456},
     "quality": {"draft": {"max_samples": 16, "max_bounces": 3, "roulette_depth": 2, "resolution_scale": 1}},
-    "formats": {"pictures": ["png", "exr"], "animations": ["webp"], "images": ["png", "hdr"], "scenes": ["glb"]},
+    "formats": {
+        "pictures": ["png", "exr"],
+        "animations": ["webp"],
+        "meshes": ["obj", "ply", "stl"],
+        "scenes": ["glb", "gltf", "zip"],
+        "images": ["png", "exr", "hdr"],
+        "materials": ["zip"],
+        "compressions": ["draco", "meshopt"],
+        "missing": {"ktx2": "opengl-basisu"},
+    },
 }
 SCHEMAS = {
     "scene": {"title": "Scene", "type": "object", "required": ["version", "camera", "materials", "shapes"]},

@@ -36,7 +36,7 @@ export class FinalPictures {
     this.pictures = new RenderPictures({ view });
     this.files = new RenderFiles({ view, changed: () => this.#show(), complain, say });
     const formats = () => {
-      const written = Object.values(page.info?.formats ?? {}).flat();
+      const written = page.info?.formats?.pictures ?? [];
       return FURTHER.filter((format) => !SPECIAL.includes(format) || written.includes(format));
     };
     this.acts = {

@@ -150,9 +150,19 @@ class AsyncClient:
             return await self._transport.upload(file, name)
         return await self._transport.upload_file(Path(file))
 
-    async def import_scene(self, path: str | Path) -> files.Scene:
-        """A model's file (GLB, glTF with its parts inside) as a scene's document."""
-        return dict(await self._transport.json("GET", f"/v1/assets/{await self.upload(path)}/scene"))
+    async def import_scene(
+        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None
+    ) -> files.Scene:
+        """A model's file (GLB, glTF with its parts inside) as a scene's document: as it was saved, or with one of its
+        material variants, or as one of its animations has it at `time` (s). `describe` lists both."""
+        chosen = {"variant": variant, "animation": animation, "time": time}
+        query = urlencode({name: value for name, value in chosen.items() if value is not None})
+        return dict(await self._transport.json("GET", f"/v1/assets/{await self.upload(path)}/scene?{query}"))
+
+    async def describe(self, path: str | Path) -> dict[str, Any]:
+        """What a file is: kind, size, warnings; of a scene `variants` and `animations` (name, duration), too."""
+        id = await self.upload(path)
+        return dict(await self._transport.json("GET", f"/v1/assets/{id}", headers={"accept": "application/json"}))
 
     async def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> lobes.Bsdf:
         """A material's BSDF for each of n directions `wo`, (n, 3), and m directions `wi`, (m, 3), in the shading

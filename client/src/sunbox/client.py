@@ -108,9 +108,15 @@ class Client:
         """The id of a file on the server, from its path or its bytes; a content is sent once."""
         return run(self._client.upload(file, name))
 
-    def import_scene(self, path: str | Path) -> files.Scene:
-        """A model's file (GLB, glTF with its parts inside) as a scene's document."""
-        return run(self._client.import_scene(path))
+    def import_scene(
+        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None
+    ) -> files.Scene:
+        """A model's file (GLB, glTF with its parts inside) as a scene's document, perhaps in a pose."""
+        return run(self._client.import_scene(path, variant, animation, time))
+
+    def describe(self, path: str | Path) -> dict[str, Any]:
+        """What a file is; of a scene with its `variants` and `animations`."""
+        return run(self._client.describe(path))
 
     def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> Bsdf:
         """A material's BSDF for directions `wo`, (n, 3), and `wi`, (m, 3), in the shading frame: z is the normal."""

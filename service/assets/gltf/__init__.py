@@ -11,8 +11,11 @@ extensions            which extensions are supported, and the warnings about the
 accessors             accessors -> arrays
 draco                 meshes that are compressed with KHR_draco_mesh_compression
 nodes                 nodes and their transforms
+placements            the transforms of all meshes, for the camera and the metering
 primitives            primitives -> triangles with normals, colours and texture coordinates
-deform                morph targets and skins, in the pose that the file shows
+deform                morph targets and skins, in the pose of the nodes
+animations            the pose of the nodes at one time of an animation
+variants              KHR_materials_variants
 materials             materials -> the document's
 material_reader       the numbers and textures of one material
 material_extensions   KHR_materials_*, as parameters of `principled`
@@ -21,4 +24,5 @@ textures              textures and samplers -> the document's
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
 lights_and_camera     lights and cameras -> the document's
+metering              the exposure that suits a file
 """

@@ -1,4 +1,4 @@
-"""Morph targets with the file's weights, and skins in the pose of their joints. No animation is played."""
+"""Morph targets with the nodes' weights, and skins in the pose of their joints."""
 
 from __future__ import annotations
 

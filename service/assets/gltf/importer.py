@@ -8,35 +8,39 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
-from service.assets.gltf import lights_and_camera
+from service.assets.gltf import animations, lights_and_camera, metering, variants
 from service.assets.gltf.deform import Skin, morphed, weights
 from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.extensions import note_unsupported
 from service.assets.gltf.json_view import JsonView, whole
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
+from service.assets.gltf.placements import Part, Placements
 from service.assets.gltf.primitives import Primitive, read_primitive
 from service.assets.gltf.textures import Textures
 from service.assets.readers.raw_mesh import MAX_COORDINATE
-from service.assets.scenes import metering
 from service.assets.scenes.framing import framed
 from service.assets.scenes.names import LONGEST
 from service.assets.scenes.part_files import PartFiles
-from service.assets.scenes.placements import Part, Placements
 from service.assets.scenes.ply_writer import ply
 from service.assets.scenes.room import stand_inside
 from service.assets.scenes.warnings import Warnings
-from service.assets.types import AssetLimits, SceneFile
+from service.assets.types import AssetLimits, Pose, SceneFile
 
 
-def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
-    """The scene of a glTF file. Raises ParseError."""
-    return _Importer(GltfDocument(data, limits)).run()
+def read_scene(data: bytes | memoryview, limits: AssetLimits, pose: Pose | None = None) -> SceneFile:
+    """The scene of a glTF file, as it was saved or in a pose. Raises ParseError."""
+    return _Importer(GltfDocument(data, limits), pose or Pose()).run()
 
 
 class _Importer:
-    def __init__(self, file: GltfDocument) -> None:
+    def __init__(self, file: GltfDocument, pose: Pose) -> None:
         self.file, self.notes, self.files = file, Warnings(), PartFiles()
+        self.animations, self.variants = animations.listed(file, self.notes), variants.listed(file)
+        if pose.variant is not None:
+            variants.choose(file, pose.variant)
+        if pose.animation is not None:
+            animations.pose(file, pose.animation, pose.time, self.notes)
         self.nodes = Nodes(file, self.notes)
         self.textures = Textures(file, self.notes, self.files.add)
         self.materials = Materials(file, self.textures, self.notes)
@@ -76,7 +80,10 @@ class _Importer:
         warnings = [*lighting.document(), *self.notes.document()]  # warnings about the whole picture come first
         triangles = sum(part.triangles for part in self.placements.shown)
         bounds = [corner.tolist() for corner in around]
-        return SceneFile(used, self.files.parts, warnings, triangles, bool(lights), exposure, aspect, bounds)
+        return SceneFile(
+            used, self.files.parts, warnings, triangles, bool(lights), exposure, aspect, bounds, self.variants,
+            self.animations,
+        )  # fmt: skip
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:
         """The exposure that suits the file's lights, where 0 does not. It is noted, and so is that nothing else
@@ -104,7 +111,7 @@ class _Importer:
             part = self._part(place, morph, skin, node)
             if part is not None:
                 name = f"{path}/{part.shape['material']}" if path and len(primitives) > 1 else path
-                self.placements.add(part, node.place.pointer, worlds, name)
+                self.placements.add(part, node, worlds, name)
 
     def _part(self, place: JsonView, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
         """The part of one primitive in one pose; a skinned one belongs to its node alone."""
@@ -166,11 +173,6 @@ class _Importer:
     def _unread(self) -> None:
         """Warn about everything else in the file that would change the picture."""
         root = self.file.root
-        variants = root.extension("KHR_materials_variants")
-        if variants is not None:
-            self.notes.add(variants.pointer, "material variants are not supported; the default materials are used")
-        if root.array("animations"):
-            self.notes.add("/animations", "animations are not played; the file's own pose is shown")
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only scene {whole(root.value.get('scene', 0), '/scene')} is shown")
         note_unsupported(root, self.notes)

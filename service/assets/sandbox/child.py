@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.errors import ParseError
+from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, RenderedPicture, SceneFile
+from service.assets.types import AssetLimits, ImageData, MeshData, Pose, RenderedPicture, SceneFile
 from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
@@ -55,13 +55,14 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
     limits = AssetLimits(**request["limits"])
     try:
         with bounded(link, request["memory"], limits.seconds):
-            parsed = _parse(request["format"], source, limits, request["whole"])
+            parsed = _parse(request["format"], source, limits, request["whole"], Pose(**request["pose"]))
             arrays, facts = _arrays(parsed)
             del parsed
             fd, table = publish(arrays)
             return {"arrays": table, **facts}, fd
     except ParseError as error:
-        return {"error": error.detail[:2000], "pointer": error.pointer[:1000]}, -1
+        told = {"error": error.detail[:2000], "pointer": error.pointer[:1000]}
+        return told | {"is_missing": isinstance(error, MissingExtra)}, -1
     except Exception as error:
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
             return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1
@@ -74,7 +75,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
 Parsed = MeshData | ImageData | SceneFile | RenderedPicture
 
 
-def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> Parsed:
+def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
     from service.assets.gltf.importer import read_scene
@@ -93,13 +94,14 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> Parsed
     mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
         return parse_mesh(format, mapped, limits)
-    return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits)
+    return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits, pose)
 
 
 def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, SceneFile):
         parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
-        text = json.dumps(vars(parsed) | {"parts": parts}).encode()
+        animations = [vars(one) for one in parsed.animations]
+        text = json.dumps(vars(parsed) | {"parts": parts, "animations": animations}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
         return {"scene": [np.frombuffer(text, np.uint8)], "files": files}, {}
     if isinstance(parsed, RenderedPicture):

@@ -9,10 +9,20 @@ from dataclasses import asdict, replace
 from types import TracebackType
 from typing import Any
 
-from service.assets.errors import ParseError
+from service.assets.errors import MissingExtra, ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, MeshOddities, RenderedPicture, SceneFile, ScenePart
+from service.assets.types import (
+    Animation,
+    AssetLimits,
+    ImageData,
+    MeshData,
+    MeshOddities,
+    Pose,
+    RenderedPicture,
+    SceneFile,
+    ScenePart,
+)
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
 from service.system.turns import Turns
@@ -93,9 +103,9 @@ class Sandbox:
         assert isinstance(parsed, MeshData | ImageData)
         return parsed
 
-    def parse_scene(self, format: str, source: bytes | int) -> SceneFile:
+    def parse_scene(self, format: str, source: bytes | int, pose: Pose | None = None) -> SceneFile:
         """Raises ParseError."""
-        parsed = self._bounded(format, source, True)
+        parsed = self._bounded(format, source, True, pose)
         assert isinstance(parsed, SceneFile)
         return parsed
 
@@ -105,16 +115,16 @@ class Sandbox:
         assert isinstance(parsed, RenderedPicture)
         return parsed
 
-    def _bounded(self, format: str, source: bytes | int, whole: bool) -> Parsed:
+    def _bounded(self, format: str, source: bytes | int, whole: bool, pose: Pose | None = None) -> Parsed:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
             with self._turns.one():
-                return self._parse(format, fd, whole)
+                return self._parse(format, fd, whole, pose or Pose())
         finally:
             if isinstance(source, bytes):
                 os.close(fd)
 
-    def _parse(self, format: str, fd: int, whole: bool) -> Parsed:
+    def _parse(self, format: str, fd: int, whole: bool, pose: Pose) -> Parsed:
         size = os.fstat(fd).st_size
         if size > self.limits.max_file:
             raise ParseError(f"{size} bytes; {self.limits.max_file} are allowed")
@@ -127,7 +137,10 @@ class Sandbox:
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)
         caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}
-        request = {"format": format, "whole": whole, "memory": memory, "limits": asdict(limits), "caps": caps}
+        request = {
+            "format": format, "whole": whole, "pose": asdict(pose), "memory": memory, "limits": asdict(limits),
+            "caps": caps,
+        }  # fmt: skip
         try:
             with self.children.one() as child:
                 reply, result = _ask(child, request, fd, limits)
@@ -187,7 +200,8 @@ def _death(child: Child, limits: AssetLimits) -> str:
 
 def _result(reply: dict[str, Any], fd: int) -> Parsed:
     if "error" in reply:
-        raise ParseError(str(reply["error"]), str(reply.get("pointer", "")))
+        kind = MissingExtra if reply.get("is_missing") is True else ParseError
+        raise kind(str(reply["error"]), str(reply.get("pointer", "")))
     try:
         arrays = adopt(fd, reply["arrays"])
     finally:
@@ -238,5 +252,6 @@ def _scene(text: Array, files: Array) -> SceneFile:
         at += size
     return SceneFile(
         facts["document"], parts, facts["warnings"], int(facts["triangles"]), bool(facts["lit"]), facts["exposure"],
-        facts["aspect_ratio"], facts["bounds"],
+        facts["aspect_ratio"], facts["bounds"], [str(name) for name in facts["variants"]],
+        [Animation(str(one["name"]), float(one["duration"])) for one in facts["animations"]],
     )  # fmt: skip

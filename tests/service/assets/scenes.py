@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from service.assets import AssetStore
 from service.assets.scene_import import Imported
 from service.scene import parse_scene
@@ -19,3 +23,10 @@ def imported(store: AssetStore, file: Gltf) -> Imported:
 
 def noted(found: Imported) -> dict[str, str]:
     return {warning["pointer"]: warning["detail"] for warning in found.warnings}
+
+
+def corners(store: AssetStore, shape: dict[str, Any]) -> np.ndarray:
+    """(m, 3, 3) in the world."""
+    mesh = store.mesh(shape["asset"])
+    matrix = np.reshape(shape.get("transform", {"matrix": np.eye(4)})["matrix"], (4, 4))
+    return (mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])[mesh.faces]

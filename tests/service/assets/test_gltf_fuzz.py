@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
+from service.assets.posing import posed_scene
+from service.assets.types import Pose
 from service.config import Config
 from service.problems import AssetError, UnsupportedMedia
 from service.scene import parse_scene
@@ -98,7 +100,12 @@ def sound() -> Gltf:
     lens = {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}
     file.node(camera=file.add("cameras", lens), extensions={"KHR_lights_punctual": {"light": 0}})
     light = {"type": "spot", "color": [1, 1, 1], "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.3}}
-    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    variants = {"variants": [{"name": "other"}]}
+    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [light]}, "KHR_materials_variants": variants}
+    first["extensions"] = {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [0]}]}}
+    spline = np.arange(18).reshape(6, 3)
+    bent = (joint, "translation", "CUBICSPLINE", [0, 1], spline)
+    file.animation("bend", bent, (joint, "rotation", "LINEAR", [0, 1], np.eye(4)[:2]))
     return file
 
 
@@ -150,7 +157,13 @@ def tried(store: AssetStore, data: bytes) -> str:
     except (AssetError, UnsupportedMedia) as error:
         return error.detail
     if info.kind == "scene":
-        parse_scene(store.scene(info.id).document)
+        try:
+            parse_scene(store.scene(info.id).document)
+            name = info.animations[0]["name"] if info.animations else None
+            pose = Pose(info.variants[0] if info.variants else None, name, 0.4)
+            parse_scene(posed_scene(store, info.id, pose).document)
+        except AssetError as error:
+            return error.detail
     return ""
 
 

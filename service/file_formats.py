@@ -1,0 +1,22 @@
+"""What `/v1/info` says of files: which formats are written and read, and what those that are not would need."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+from service.assets.formats import COMPRESSIONS, KINDS, missing
+from service.images import animation
+from service.views import FileFormat
+
+READ = {"meshes": "mesh", "scenes": "scene", "images": "image"}  # names of lists, by the kind of asset
+
+
+def told() -> dict[str, Any]:
+    return {
+        "pictures": list(get_args(FileFormat)),
+        "animations": list(animation.FORMATS),
+        **{name: [format for format, each in KINDS.items() if each == kind] for name, kind in READ.items()},
+        "materials": ["zip"],
+        "compressions": list(COMPRESSIONS),
+        "missing": missing(),
+    }
