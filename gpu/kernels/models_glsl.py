@@ -14,6 +14,10 @@ and where the row in `gpu/layout/models.py` says so:
     NAME_delta_chance(s, wo)                   `may_be_delta`: the chance that NAME_sample picks one of them
     NAME_sample_delta(wo, behind, u_lobe, s)   `may_be_delta`: a LobeSample where it has no other lobes
     NAME_terms(s, wo, wi, wm)                  `has_terms`: the Terms for a facet's normal wm
+    NAME_metal(s, c), NAME_metal_mean(s)       `needs_tables`: the metal's reflectance at cosine c, and its mean
+    NAME_tinted(s, f)                          `needs_tables`: the dielectric's reflectance f with the model's colour
+
+The last three are called by `bsdf/lobes/base/`, which the models that look up the tables share.
 
 `model_members.glsl` is what models add to Surface. Both exist only in memory, as `layout.glsl` does.
 """
@@ -37,8 +41,14 @@ def predicates() -> str:
 
 def text() -> str:
     """The text of `models.glsl`."""
-    coats, deltas = _with("has_coat_normals"), _with("may_be_delta")
+    coats, deltas, tabulated = _with("has_coat_normals"), _with("may_be_delta"), _with("needs_tables")
+    bases = {
+        "vec3 models_metal(Surface s, float c)": "{}_metal(s, c)",
+        "vec3 models_metal_mean(Surface s)": "{}_metal_mean(s)",
+        "vec3 models_tinted(Surface s, float f)": "{}_tinted(s, f)",
+    }
     return "\n".join([
+        *(f"{head};" for head in bases),  # their callers come before the models
         _includes(model.name for model in MODELS),
         _dispatcher("void models_surface(Material m, vec2 tangent, inout Surface s)",
                     _base("{}_surface(m, tangent, s);"), _ladder(FLAGGED, "{}_surface(m, tangent, s);")),
@@ -63,6 +73,7 @@ def text() -> str:
         _dispatcher("Terms models_terms(Surface s, vec3 wo, vec3 wi, vec3 wm)",
                     "Terms r = Terms(vec3(0.0), 0.0, 0.0, true);",
                     _ladder(_with("has_terms"), "r = {}_terms(s, wo, wi, wm);")),
+        *(_dispatcher(head, "vec3 r = vec3(0.0);", _only(tabulated, f"r = {call};")) for head, call in bases.items()),
     ])  # fmt: skip
 
 

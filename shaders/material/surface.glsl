@@ -21,6 +21,22 @@ struct Surface {
     float transmission; // share of the base that is clear
     float eta;          // index beyond the surface over index on wo's side
 #endif
+#if ANY_NEEDS_TABLES   // set for models that look up the tables of energy.glsl
+    float eta_outside;     // index inside over outside
+    bool inside;           // wo is inside a body that transmits
+    bool is_delta;         // the base is perfectly smooth
+    bool index_matched;    // the index is 1: rays pass as if nothing were there
+    vec3 specular_color;
+    vec3 clear_color;      // of what is refracted
+    float aspect;          // of the specular lobe, 1 where it is round
+    vec4 albedo;           // energy_albedo at wo
+    vec4 albedo_mean;      // energy_mean
+    bool coat_is_delta;
+    float coat_roughness;  // for the tables, 0 where the coat is a mirror
+    float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
+    float sheen_roughness; // for the tables
+    float sheen_albedo;    // the share that the sheen keeps from what is under it
+#endif
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame
 #endif

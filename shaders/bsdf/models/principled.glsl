@@ -5,8 +5,9 @@
 #include "bsdf/lobes/principled/diffuse.glsl"
 #include "bsdf/lobes/principled/sheen_charlie.glsl"
 #include "bsdf/lobes/principled/clearcoat.glsl"
-#include "bsdf/lobes/principled/multiscatter.glsl"
-#include "bsdf/lobes/principled/specular.glsl"
+#include "bsdf/lobes/base/multiscatter.glsl"
+#include "bsdf/lobes/base/specular.glsl"
+#include "bsdf/lobes/base/base.glsl"
 
 #if HAS_PRINCIPLED
 // Sets the members that do not depend on the direction; principled_face sets the others.
@@ -16,6 +17,7 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.specular_color = m.specular_color * mix(vec3(1.0), tint, m.specular_tint);
     float f0 = sqrt(0.08 * m.specular);
     s.eta_outside = m.ior >= 1.0 ? m.ior : (1.0 + f0) / (1.0 - f0);
+    s.clear_color = m.base_color;
     s.index_matched = s.eta_outside < 1.0001;
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
@@ -51,11 +53,19 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
 #endif
 }
 
+// The tinted reflectance of the dielectric: the colour multiplies F0, 1 stays 1, and none is above the untinted one.
+vec3 principled_tinted(Surface s, float f) {
+    float f0 = fresnel_normal(s.eta_outside);
+    return max(vec3(0.0), f - (1.0 - s.specular_color) * (f0 / (1.0 - f0) * (1.0 - f)));
+}
+
+// The metal's reflectance at cosine c, and its cosine-weighted mean.
+vec3 principled_metal(Surface s, float c) { return mix(s.base_color, vec3(1.0), fresnel_schlick(c)); }
+vec3 principled_metal_mean(Surface s) { return s.base_color + (1.0 - s.base_color) / 21.0; }
+
 // The chances of picking each lobe; they sum to one.
 struct PrincipledWeights {
-    float diffuse;       // diffuse light and light between microfacets that leaves above the surface
-    float diffuse_below; // light between microfacets that leaves below it
-    float specular;
+    BaseWeights base;
     float sheen;
     float coat;
 };
@@ -92,139 +102,68 @@ float principled_sheen_albedo(Surface s, float c) {
 #endif
 }
 
-vec4 principled_albedo(Surface s, vec3 w) {
-    return energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
-}
-
-// Sets what depends on the side that the surface is seen from; `behind` is the inner side of its geometry.
-void principled_side(bool behind, inout Surface s) {
-#if HAS_TRANSMISSION
-    s.inside = behind && s.transmission > 0.0 && s.metallic < 1.0;
-    s.eta = s.inside ? 1.0 / s.eta_outside : s.eta_outside;
-#endif
-}
-
 // Completes the surface with what depends on wo.
 void principled_face(vec3 wo, bool behind, inout Surface s) {
-    principled_side(behind, s);
-    s.albedo = principled_albedo(s, wo);
+    base_side(behind, s);
+    s.albedo = base_albedo(s, wo);
     s.albedo_mean = energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
     // The layers lie on the outer side only.
     s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
     s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
 }
 
-// The share that comes back of the light that single scattering loses between microfacets of the mixed base.
-vec3 principled_multiscatter(Surface s) {
-    vec3 metal = multiscatter_fresnel(s.base_color + (1.0 - s.base_color) / 21.0, s.albedo_mean.x);
-    vec3 tinted = multiscatter_fresnel(principled_specular_tinted(s, fresnel_mean(s.eta_outside)), s.albedo_mean.x);
-    return mix(tinted * (1.0 - s.transmission), metal, s.metallic);
-}
-
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
-    float clear = multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x);
-    PrincipledWeights w;
-    w.diffuse = principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear))
-            + (1.0 - s.albedo.x) * luminance(principled_multiscatter(s));
-    w.diffuse_below = 0.0;
-    float specular = luminance(principled_specular_fresnel(s, wo.z));
-#if HAS_TRANSMISSION
-    specular += luminance(principled_specular_transmittance(s, wo.z));
-    if (multiscatter_glass(s)) {
-        float glass = (1.0 - s.metallic) * s.transmission;
-        float t = multiscatter_transmit_chance(s), lost = glass * multiscatter_near(s, s.albedo);
-        w.diffuse += lost * (1.0 - t);
-        w.diffuse_below = lost * t * luminance(s.base_color);
-        specular *= 1.0 - lost;
-        // Where nearly all directions are totally reflected, a rough lobe as a whole is nearly diffuse and light stays
-        // inside for many bounces: microfacets that lead nowhere would make the weights grow with each bounce.
-        float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside that lead out
-        float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * specular;
-        specular -= spread;
-        w.diffuse += spread * (1.0 - share);
-        w.diffuse_below += spread * share * luminance(s.base_color);
-    }
-#endif
-    // The floor of 0.05 keeps the lobe sampled where it is faint from here, as it rises to 1 towards grazing angles.
-    w.specular = max(0.05, specular);
+    float clear = base_clear(s);
+    BaseWeights base = base_weights(s, wo, principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear)));
     float under = principled_layers(s, 0.0, 0.0);
-    w.diffuse *= under;
-    w.diffuse_below *= under;
-    w.specular *= under;
-    w.sheen = 0.0;
-    w.coat = 0.0;
+    PrincipledWeights w = PrincipledWeights(base, 0.0, 0.0);
+    w.base.diffuse *= under;
+    w.base.diffuse_below *= under;
+    w.base.specular *= under;
 #if HAS_SHEEN
     w.sheen = s.sheen_albedo;
 #endif
 #if HAS_CLEARCOAT
     w.coat = s.coat_albedo;
 #endif
-    float inv = 1.0 / (w.diffuse + w.diffuse_below + w.specular + w.sheen + w.coat);
-    return PrincipledWeights(w.diffuse * inv, w.diffuse_below * inv, w.specular * inv, w.sheen * inv, w.coat * inv);
+    float inv = 1.0 / (w.base.diffuse + w.base.diffuse_below + w.base.specular + w.sheen + w.coat);
+    w.base = BaseWeights(w.base.diffuse * inv, w.base.diffuse_below * inv, w.base.specular * inv);
+    return PrincipledWeights(w.base, w.sheen * inv, w.coat * inv);
 }
-
-#if HAS_TRANSMISSION
-Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) {
-    if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
-    vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
-    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, principled_albedo(s, wi)));
-    float pdf = w.diffuse_below * INV_PI * -wi.z;
-    vec3 wm = principled_specular_half_vector(s, wo_t, wi_t);
-    if (!s.is_delta && !s.index_matched) {
-        pdf += w.specular * principled_specular_transmit_folded(s, wo_t, wi_t);
-        if (wm.z > 0.0) {
-            f += LOBE(LOBE_TRANSMISSION, principled_specular_transmit(s, wo_t, wi_t, wm));
-            pdf += w.specular * principled_specular_transmit_pdf(s, wo_t, wi_t, wm);
-        }
-    }
-    float coat_i = s.inside ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
-    float sheen_i = s.inside ? principled_sheen_albedo(s, wi.z) : 0.0;
-    return Scatter(f * principled_layers(s, coat_i, sheen_i), pdf);
-}
-#endif
 
 // Without the perfectly specular lobes.
 Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     PrincipledWeights w = principled_weights(s, wo);
-    vec3 wm = normalize(wo + wi);
-    float cos_d = dot(wo, wm);
-    vec3 wo_t = wo, wi_t = wi, wm_t = wm;
-#if HAS_ANISOTROPIC
-    wo_t = bsdf_turn(s, wo);
-    wi_t = bsdf_turn(s, wi);
-    wm_t = bsdf_turn(s, wm);
-#endif
-    float clear = multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x);
-    vec4 albedo_i = principled_albedo(s, wi);
-    vec3 f = LOBE(LOBE_DIFFUSE, principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
-                                                        multiscatter_albedo(albedo_i, clear),
-                                                        multiscatter_albedo(s.albedo_mean, clear)));
-    f += LOBE(LOBE_MULTISCATTER, multiscatter_reflect(s, albedo_i, principled_multiscatter(s)));
-    float pdf = w.diffuse * INV_PI * wi.z;
-    if (!s.is_delta) {
-        f += LOBE(LOBE_SPECULAR, principled_specular_reflect(s, wo_t, wi_t, wm_t, cos_d));
-        pdf += w.specular * principled_specular_reflect_pdf(s, wo_t, wm_t, cos_d);
+    vec4 albedo_i = base_albedo(s, wi);
 #if HAS_TRANSMISSION
-        pdf += w.specular * principled_specular_reflect_folded(s, wo_t, wi_t);
-#endif
+    if (wi.z < 0.0) {
+        Scatter below = base_eval_below(s, wo, wi, albedo_i, w.base);
+        float coat_i = s.inside ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
+        float sheen_i = s.inside ? principled_sheen_albedo(s, wi.z) : 0.0;
+        below.f *= principled_layers(s, coat_i, sheen_i);
+        return below;
     }
+#endif
+    vec3 wm = normalize(wo + wi);
+    float cos_d = dot(wo, wm), clear = base_clear(s);
+    vec3 diffuse = principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
+                                           multiscatter_albedo(albedo_i, clear),
+                                           multiscatter_albedo(s.albedo_mean, clear));
+    Scatter r = base_eval(s, wo, wi, wm, albedo_i, diffuse, w.base);
     if (!s.inside) {
         float coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
         float sheen_i = principled_sheen_albedo(s, wi.z);
-        f *= principled_layers(s, coat_i, sheen_i);
+        r.f *= principled_layers(s, coat_i, sheen_i);
 #if HAS_SHEEN
-        f += LOBE(LOBE_SHEEN, sheen_charlie_eval(s, wo, wi) * (1.0 - max(s.coat_albedo, coat_i)));
-        pdf += w.sheen * sheen_charlie_pdf();
+        r.f += LOBE(LOBE_SHEEN, sheen_charlie_eval(s, wo, wi) * (1.0 - max(s.coat_albedo, coat_i)));
+        r.pdf += w.sheen * sheen_charlie_pdf();
 #endif
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS
-        f += LOBE(LOBE_CLEARCOAT, principled_clearcoat_eval(s, wo, wi, wm, cos_d));
-        pdf += w.coat * principled_clearcoat_pdf(s, wo, wm);
+        r.f += LOBE(LOBE_CLEARCOAT, principled_clearcoat_eval(s, wo, wi, wm, cos_d));
+        r.pdf += w.coat * principled_clearcoat_pdf(s, wo, wm);
 #endif
     }
-#if HAS_TRANSMISSION
-    if (wi.z < 0.0) return principled_eval_below(s, wo, wi, w);
-#endif
-    return Scatter(f, pdf);
+    return r;
 }
 
 #if HAS_COAT_NORMALS
@@ -240,23 +179,17 @@ Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
 
 // Samples the microfacet lobe, which is picked with the chance `weight`.
 LobeSample principled_sample_specular(Surface s, vec3 wo, float v, vec2 u, float weight) {
-    vec3 wi = bsdf_turn_back(s, principled_specular_sample(s, bsdf_turn(s, wo), v, u));
-    LobeSample r = LobeSample(wi, s.is_delta, Scatter(vec3(0.0), 0.0), false);
-    float chance = principled_specular_reflect_chance(s, wo.z);
-    vec3 f = principled_specular_fresnel(s, wo.z);
-    float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // in a mirror wi has the cosine of wo
+    LobeSample r = base_sample_facet(s, wo, v, u, weight);
+    if (r.is_delta) {
+        float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // in a mirror wi has the cosine of wo
 #if HAS_TRANSMISSION
-    if (wi.z < 0.0) {
-        if (s.index_matched) r.is_delta = true;
-        f = principled_specular_transmittance(s, wo.z);
-        chance = 1.0 - chance;
-        if (s.inside) {
-            coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
-            sheen_i = principled_sheen_albedo(s, wi.z);
+        if (r.wi.z < 0.0 && s.inside) {
+            coat_i = principled_coat_albedo(s, principled_coat_cosine(s, r.wi));
+            sheen_i = principled_sheen_albedo(s, r.wi.z);
         }
-    }
 #endif
-    if (r.is_delta) r.scatter = Scatter(f * principled_layers(s, coat_i, sheen_i), weight * chance);
+        r.scatter.f *= principled_layers(s, coat_i, sheen_i);
+    }
     return r;
 }
 
@@ -274,14 +207,14 @@ LobeSample principled_sample_coat(Surface s, vec3 wo, vec2 u, float weight) {
 LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     PrincipledWeights w = principled_weights(s, wo);
     LobeSample r = bsdf_rough_sample(sampling_cosine(u));
-    float v = u_lobe - w.diffuse;
+    float v = u_lobe - w.base.diffuse;
 #if HAS_TRANSMISSION
     if (v >= 0.0) r.wi.z = -r.wi.z;
-    v -= w.diffuse_below;
+    v -= w.base.diffuse_below;
 #endif
-    LobeSample facet = principled_sample_specular(s, wo, clamp(v / w.specular, 0.0, 0.9999999), u, w.specular);
+    LobeSample facet = principled_sample_specular(s, wo, clamp(v / w.base.specular, 0.0, 0.9999999), u, w.base.specular);
     if (v >= 0.0) r = facet;
-    v -= w.specular;
+    v -= w.base.specular;
 #if HAS_SHEEN
     if (v >= 0.0 && w.sheen > 0.0) {
         r.wi = sheen_charlie_sample(u);
@@ -299,36 +232,28 @@ LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 float principled_delta_chance(Surface s, vec3 wo) {
     PrincipledWeights w = principled_weights(s, wo);
     float p = 0.0;
-    float chance = principled_specular_reflect_chance(s, wo.z);
+    float chance = base_reflect_chance(s, wo.z);
 #if HAS_TRANSMISSION
-    if (s.index_matched) p = w.specular * (1.0 - chance);
+    if (s.index_matched) p = w.base.specular * (1.0 - chance);
 #endif
-    if (s.is_delta) p = w.specular;
+    if (s.is_delta) p = w.base.specular;
 #if HAS_CLEARCOAT
     if (s.coat_is_delta) p += w.coat;
 #endif
     return p;
 }
 
-// What principled_sample gives for a surface that only mirrors or refracts, without the work for other lobes; u_lobe
-// picks one of the two. Sets the members that path_extend reads.
+// What principled_sample gives for a surface that only mirrors or refracts, without the work for other lobes.
 LobeSample principled_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
-    principled_side(behind, s);
-    float chance = principled_specular_reflect_chance(s, wo.z);
-    vec3 wi = principled_specular_sample(s, wo, u_lobe, vec2(0.0));
-    Scatter scatter = Scatter(principled_specular_fresnel(s, wo.z), chance);
-#if HAS_TRANSMISSION
-    if (u_lobe >= chance) scatter = Scatter(principled_specular_transmittance(s, wo.z), 1.0 - chance);
-#endif
-    return LobeSample(wi, true, scatter, false);
+    return base_sample_delta(wo, behind, u_lobe, s);
 }
 
 // The perfectly specular lobes, each as principled_sample gives it; those that the surface lacks are left alone.
 void principled_deltas(Surface s, vec3 wo, inout LobeSample deltas[BSDF_DELTAS]) {
     PrincipledWeights w = principled_weights(s, wo);
-    LobeSample mirrored = principled_sample_specular(s, wo, 0.0, vec2(0.0), w.specular);
+    LobeSample mirrored = principled_sample_specular(s, wo, 0.0, vec2(0.0), w.base.specular);
     if (mirrored.is_delta && mirrored.wi.z > 0.0) deltas[0] = mirrored;
-    LobeSample refracted = principled_sample_specular(s, wo, 0.9999999, vec2(0.0), w.specular);
+    LobeSample refracted = principled_sample_specular(s, wo, 0.9999999, vec2(0.0), w.base.specular);
     if (refracted.is_delta && refracted.wi.z < 0.0) deltas[1] = refracted;
 #if HAS_CLEARCOAT
     LobeSample coat = principled_sample_coat(s, wo, vec2(0.0), w.coat);
@@ -337,7 +262,7 @@ void principled_deltas(Surface s, vec3 wo, inout LobeSample deltas[BSDF_DELTAS])
 }
 
 Terms principled_terms(Surface s, vec3 wo, vec3 wi, vec3 wm) {
-    return Terms(principled_specular_fresnel(s, wm.z), ggx_d(bsdf_turn(s, wm), s.alpha),
+    return Terms(base_fresnel(s, wm.z), ggx_d(bsdf_turn(s, wm), s.alpha),
                  ggx_visibility(bsdf_turn(s, wo), bsdf_turn(s, wi), s.alpha), !s.is_delta);
 }
 #endif

@@ -2,7 +2,7 @@
 // shading at Imageworks"]: on each side the share that single scattering loses at wo times the share that it loses at
 // wi. Each `albedo` is energy_albedo's four shares: at wo (in s), at wi, or on average. The diffuse lobes above and
 // below the surface sample this light.
-#if HAS_PRINCIPLED
+#if ANY_NEEDS_TABLES
 // The least mean loss to divide by: below it the steps of the tables would show, and there is nothing to see.
 const float MULTISCATTER_LEAST_LOSS = 5e-5;
 
@@ -32,7 +32,7 @@ vec3 multiscatter_transmit(Surface s, vec4 albedo_i) {
     if (!multiscatter_glass(s)) return vec3(0.0);
     float f = multiscatter_near(s, s.albedo) * multiscatter_far(s, albedo_i)
             / max(multiscatter_far(s, s.albedo_mean), MULTISCATTER_LEAST_LOSS);
-    return (1.0 - s.metallic) * s.transmission * multiscatter_transmit_chance(s) * INV_PI * f * s.base_color;
+    return (1.0 - s.metallic) * s.transmission * multiscatter_transmit_chance(s) * INV_PI * f * s.clear_color;
 }
 #endif
 

@@ -1,0 +1,132 @@
+// A base that mixes metal, a diffuse material under a dielectric, and glass, without the layers on it. What its model
+// decides are the reflectances: models_metal, models_metal_mean and models_tinted, and the Surface's clear_color.
+#if ANY_NEEDS_TABLES
+vec4 base_albedo(Surface s, vec3 w) {
+    return energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+}
+
+// Sets what depends on the side that the surface is seen from; `behind` is the inner side of its geometry.
+void base_side(bool behind, inout Surface s) {
+#if HAS_TRANSMISSION
+    s.inside = behind && s.transmission > 0.0 && s.metallic < 1.0;
+    s.eta = s.inside ? 1.0 / s.eta_outside : s.eta_outside;
+#endif
+}
+
+// The share of untinted light that comes back after all of what the facets of the dielectric lose.
+float base_clear(Surface s) { return multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x); }
+
+// The share that comes back of the light that single scattering loses between microfacets of the mixed base.
+vec3 base_multiscatter(Surface s) {
+    vec3 metal = multiscatter_fresnel(models_metal_mean(s), s.albedo_mean.x);
+    vec3 tinted = multiscatter_fresnel(models_tinted(s, fresnel_mean(s.eta_outside)), s.albedo_mean.x);
+    return mix(tinted * (1.0 - s.transmission), metal, s.metallic);
+}
+
+// Measures of how much each lobe gives, by which one is picked.
+struct BaseWeights {
+    float diffuse;       // diffuse light and light between microfacets that leaves above the surface
+    float diffuse_below; // light between microfacets that leaves below it
+    float specular;
+};
+
+// `diffuse` is that of the diffuse lobe alone. The sum is not one.
+BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
+    BaseWeights w;
+    w.diffuse = diffuse + (1.0 - s.albedo.x) * luminance(base_multiscatter(s));
+    w.diffuse_below = 0.0;
+    float specular = luminance(base_fresnel(s, wo.z));
+#if HAS_TRANSMISSION
+    specular += luminance(base_transmittance(s, wo.z));
+    if (multiscatter_glass(s)) {
+        float glass = (1.0 - s.metallic) * s.transmission;
+        float t = multiscatter_transmit_chance(s), lost = glass * multiscatter_near(s, s.albedo);
+        w.diffuse += lost * (1.0 - t);
+        w.diffuse_below = lost * t * luminance(s.clear_color);
+        specular *= 1.0 - lost;
+        // Where nearly all directions are totally reflected, a rough lobe as a whole is nearly diffuse and light stays
+        // inside for many bounces: microfacets that lead nowhere would make the weights grow with each bounce.
+        float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside that lead out
+        float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * specular;
+        specular -= spread;
+        w.diffuse += spread * (1.0 - share);
+        w.diffuse_below += spread * share * luminance(s.clear_color);
+    }
+#endif
+    // The floor of 0.05 keeps the lobe sampled where it is faint from here, as it rises to 1 towards grazing angles.
+    w.specular = max(0.05, specular);
+    return w;
+}
+
+#if HAS_TRANSMISSION
+// Of light that passes the base: f lacks the layers.
+Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BaseWeights w) {
+    if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
+    vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
+    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, albedo_i));
+    float pdf = w.diffuse_below * INV_PI * -wi.z;
+    vec3 wm = base_half_vector(s, wo_t, wi_t);
+    if (!s.is_delta && !s.index_matched) {
+        pdf += w.specular * base_transmit_folded(s, wo_t, wi_t);
+        if (wm.z > 0.0) {
+            f += LOBE(LOBE_TRANSMISSION, base_transmit(s, wo_t, wi_t, wm));
+            pdf += w.specular * base_transmit_pdf(s, wo_t, wi_t, wm);
+        }
+    }
+    return Scatter(f, pdf);
+}
+#endif
+
+// Of light that the base scatters back, without the perfectly specular lobes; `diffuse` is the diffuse lobe's.
+Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, vec3 diffuse, BaseWeights w) {
+    float cos_d = dot(wo, wm);
+    vec3 wo_t = wo, wi_t = wi, wm_t = wm;
+#if HAS_ANISOTROPIC
+    wo_t = bsdf_turn(s, wo);
+    wi_t = bsdf_turn(s, wi);
+    wm_t = bsdf_turn(s, wm);
+#endif
+    vec3 f = LOBE(LOBE_DIFFUSE, diffuse);
+    f += LOBE(LOBE_MULTISCATTER, multiscatter_reflect(s, albedo_i, base_multiscatter(s)));
+    float pdf = w.diffuse * INV_PI * wi.z;
+    if (!s.is_delta) {
+        f += LOBE(LOBE_SPECULAR, base_reflect(s, wo_t, wi_t, wm_t, cos_d));
+        pdf += w.specular * base_reflect_pdf(s, wo_t, wm_t, cos_d);
+#if HAS_TRANSMISSION
+        pdf += w.specular * base_reflect_folded(s, wo_t, wi_t);
+#endif
+    }
+    return Scatter(f, pdf);
+}
+
+// Samples the microfacets, which are picked with the chance `weight`; v picks reflection or refraction. The f of a
+// perfectly specular sample lacks the layers.
+LobeSample base_sample_facet(Surface s, vec3 wo, float v, vec2 u, float weight) {
+    vec3 wi = bsdf_turn_back(s, base_sample(s, bsdf_turn(s, wo), v, u));
+    LobeSample r = LobeSample(wi, s.is_delta, Scatter(vec3(0.0), 0.0), false);
+    float chance = base_reflect_chance(s, wo.z);
+    vec3 f = base_fresnel(s, wo.z);
+#if HAS_TRANSMISSION
+    if (wi.z < 0.0) {
+        if (s.index_matched) r.is_delta = true;
+        f = base_transmittance(s, wo.z);
+        chance = 1.0 - chance;
+    }
+#endif
+    if (r.is_delta) r.scatter = Scatter(f, weight * chance);
+    return r;
+}
+
+// A surface without other lobes, which only mirrors or refracts; u_lobe picks one of the two. Sets the members that
+// path_extend reads.
+LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
+    base_side(behind, s);
+    float chance = base_reflect_chance(s, wo.z);
+    vec3 wi = base_sample(s, wo, u_lobe, vec2(0.0));
+    Scatter scatter = Scatter(base_fresnel(s, wo.z), chance);
+#if HAS_TRANSMISSION
+    if (u_lobe >= chance) scatter = Scatter(base_transmittance(s, wo.z), 1.0 - chance);
+#endif
+    return LobeSample(wi, true, scatter, false);
+}
+#endif
