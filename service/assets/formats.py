@@ -8,10 +8,10 @@ from mmap import mmap
 
 from service.assets.types import Kind
 
-COMPRESSIONS = ("draco",)  # of meshes and images inside glTF files
+COMPRESSIONS = ("draco", "meshopt", "ktx2")  # of meshes and images inside glTF files
 
 # What installs the package that a format needs, and the module by which it is known to be there.
-PACKAGES: dict[str, tuple[str, str]] = {}
+PACKAGES: dict[str, tuple[str, str]] = {"meshopt": ("meshopt", "meshopt"), "ktx2": ("opengl-basisu", "opengl_basisu")}
 
 KINDS: dict[str, Kind] = {
     "obj": "mesh",

@@ -10,6 +10,7 @@ json_view             a place in the JSON, with its values by type and errors th
 extensions            which extensions are supported, and the warnings about the others
 accessors             accessors -> arrays
 draco                 meshes that are compressed with KHR_draco_mesh_compression
+meshopt_views         buffer views that are compressed with EXT_ or KHR_meshopt_compression
 nodes                 nodes and their transforms
 placements            the transforms of all meshes, for the camera and the metering
 primitives            primitives -> triangles with normals, colours and texture coordinates
@@ -21,6 +22,7 @@ material_reader       the numbers and textures of one material
 material_extensions   KHR_materials_*, as parameters of `principled`
 specular_glossiness   KHR_materials_pbrSpecularGlossiness
 textures              textures and samplers -> the document's
+ktx2_images           images of KHR_texture_basisu as PNG files
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
 lights_and_camera     lights and cameras -> the document's

@@ -8,7 +8,6 @@ import numpy as np
 
 from service.assets.errors import ParseError
 from service.assets.gltf.document import Array, GltfDocument
-from service.assets.gltf.extensions import remedy
 from service.assets.gltf.json_view import JsonView, shown
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -33,8 +32,7 @@ def read(file: GltfDocument, source: JsonView, name: str, *types: str) -> Array:
         if not place.value.get("extensions"):
             raise place.error("bufferView", "is missing: the accessor has no data")
         names = sorted(place.need("extensions").value)
-        detail = f"its data are there in compressed form only ({', '.join(names)[:80]})"
-        raise place.error("extensions", detail + remedy(names))
+        raise place.error("extensions", f"its data are there in compressed form only ({', '.join(names)[:80]})")
     else:
         values = np.zeros((count, width), dtype)
     if "sparse" in place:

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from service.assets.errors import ParseError
-from service.assets.gltf.extensions import check_required, remedy
+from service.assets.gltf import meshopt_views
+from service.assets.gltf.extensions import check_required
 from service.assets.gltf.json_view import JsonView, shown, whole
 from service.assets.types import AssetLimits
 from service.problems import escaped
@@ -36,6 +37,7 @@ class GltfDocument:
         text, self._binary = _chunks(view) if binary else (view, None)
         self.root = _root(bytes(text), binary)
         self._buffers: dict[int, Bytes] = {}
+        self._decoded: dict[str, Bytes] = {}  # compressed views, by their place
         asset = self.root.need("asset")
         version, least = asset.text("version"), asset.text("minVersion", "2.0")
         if not version.startswith("2."):
@@ -60,9 +62,15 @@ class GltfDocument:
         return self.item(kind, place.value.get(name), place.at(name))
 
     def view(self, place: JsonView, name: str = "bufferView") -> tuple[Bytes, JsonView]:
-        """The bytes of the buffer view that a place refers to."""
+        """The bytes of the buffer view that a place refers to, decompressed."""
         view = self.follow(place, name, "bufferViews")
-        return self.range(view, view), view
+        compressed = meshopt_views.extension(view)
+        if compressed is None:
+            return self.range(view, view), view
+        if view.pointer not in self._decoded:
+            packed = self.range(compressed, compressed)
+            self._decoded[view.pointer] = meshopt_views.decoded(compressed, packed, self.limits)
+        return self._decoded[view.pointer], view
 
     def range(self, source: JsonView, named: JsonView) -> Bytes:
         """The bytes from `byteOffset` on, `byteLength` of them, of the buffer that `source` names."""
@@ -98,7 +106,7 @@ def embedded(place: JsonView) -> Bytes:
         extensions = place.object("extensions")
         names = sorted(extensions.value) if extensions else []
         which = f": its data are there in compressed form only ({names[0][:60]})" if names else ""
-        raise place.error("uri", f"is missing{which}{remedy(names)}")
+        raise place.error("uri", f"is missing{which}")
     head, comma, body = uri.partition(",")
     if not head.startswith("data:") or not comma or not head.endswith(";base64"):
         raise place.error(

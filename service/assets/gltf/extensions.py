@@ -14,8 +14,9 @@ READ = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_node_visibility",
-    "KHR_texture_transform", "EXT_mesh_gpu_instancing", "EXT_texture_webp",
+    "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_meshopt_compression",
+    "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform", "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression", "EXT_texture_webp",
 }  # fmt: skip
 # These describe motion, sound, behaviour, meaning, provenance or coarser versions of the model: a still picture
 # is the same without them.
@@ -25,12 +26,6 @@ UNSEEN = {
     "EXT_instance_features", "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "FB_ngon_encoding",
     "GODOT_single_root", "MSFT_audio_emitter", "MSFT_lod",
 }  # fmt: skip
-# The commands that remove a compression from a file.
-DECOMPRESS = {
-    "EXT_meshopt_compression": "`gltf-transform copy IN.glb OUT.glb`",
-    "KHR_meshopt_compression": "`gltfpack -i IN.glb -o OUT.glb`",
-    "KHR_texture_basisu": "`gltf-transform ktxdecompress IN.glb OUT.glb`",
-}
 PLAIN = {int, float, str}  # an array that begins with one of these has no objects: most of a file are numbers
 DEEPEST = 32  # levels of the file that are searched; a normal file has about ten
 
@@ -41,14 +36,7 @@ def check_required(root: JsonView) -> None:
     """Raise ParseError where a file requires an extension that is not read."""
     for k, name in enumerate(root.array("extensionsRequired")):
         if name not in READ | UNSEEN:
-            detail = f"the file requires {shown(name)}, which is not supported"
-            raise ParseError(detail + remedy([name]), f"/extensionsRequired/{k}")
-
-
-def remedy(names: Any) -> str:
-    """The end of a sentence that says how to remove one of these extensions from a file; "" where no way is known."""
-    known = [DECOMPRESS[name] for name in names if isinstance(name, str) and name in DECOMPRESS]
-    return f"; {known[0]} writes the model without it" if known else ""
+            raise ParseError(f"the file requires {shown(name)}, which is not supported", f"/extensionsRequired/{k}")
 
 
 def note_unsupported(root: JsonView, notes: Warnings) -> None:

@@ -23,7 +23,7 @@ def pixels(textures: Textures, info: JsonView | None) -> Any:
         return None
     Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
     try:
-        image = Image.open(io.BytesIO(textures.file.image(source)), formats=["PNG", "JPEG", "WEBP"])
+        image = Image.open(io.BytesIO(textures.data(source)), formats=["PNG", "JPEG", "WEBP"])
         check_size(*image.size, textures.file.limits)
         return image.convert("RGBA")
     except (OSError, SyntaxError, ValueError):

@@ -13,8 +13,8 @@ import numpy as np
 
 from service.assets.errors import ParseError
 from service.assets.formats import sniff
+from service.assets.gltf import ktx2_images
 from service.assets.gltf.document import GltfDocument
-from service.assets.gltf.extensions import remedy
 from service.assets.gltf.json_view import JsonView, number
 from service.assets.gltf.primitives import UV_SETS
 from service.assets.scenes.names import unique
@@ -39,6 +39,7 @@ class Textures:
     made: dict[tuple[str, str], list[Any]] = field(default_factory=dict)  # references to images of our own, and more
     _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
     _references: dict[str, str] = field(default_factory=dict)  # to images, by their place
+    _decoded: dict[str, bytes] = field(default_factory=dict)  # PNG files made of images, by their place
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
     def use(self, info: JsonView | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
@@ -87,15 +88,14 @@ class Textures:
 
     def source(self, texture: JsonView) -> JsonView | None:
         """The texture's image; None, with a warning, where its format is not read."""
-        webp = texture.extension("EXT_texture_webp")
-        for owner in (webp, texture):
+        for owner in (*map(texture.extension, ("EXT_texture_webp", ktx2_images.NAME)), texture):
             if owner is not None and "source" in owner:
                 return self.file.follow(owner, "source", "images")
         other = texture.object("extensions")
         names = sorted(other.value) if other else []
         which = f" ({', '.join(names)[:80]})" if names else ""
         self.notes.add(
-            texture.pointer, f"the texture has no image in PNG, JPEG or WebP{which} and is left out{remedy(names)}"
+            texture.pointer, f"the texture has no image in PNG, JPEG, WebP or KTX2{which} and is left out"
         )
         return None
 
@@ -105,10 +105,10 @@ class Textures:
         if place is None:
             return None
         if place.pointer not in self._references:
-            data = self.file.image(place)
+            data = self.data(place)
             if sniff(data) not in READ:
                 at = "bufferView" if "bufferView" in place else "uri"
-                raise place.error(at, f"is not a PNG, JPEG or WebP image; it begins with {data[:12]!r}")
+                raise place.error(at, f"is not a PNG, JPEG, WebP or KTX2 image; it begins with {data[:12]!r}")
             self._references[place.pointer] = self.store(data, place.pointer)
         return self._references[place.pointer]
 
@@ -118,8 +118,17 @@ class Textures:
         if place is None:
             return ""
         if place.pointer not in self._channels:
-            self._channels[place.pointer] = _channels(self.file.image(place), place)
+            self._channels[place.pointer] = _channels(self.data(place), place)
         return self._channels[place.pointer]
+
+    def data(self, place: JsonView) -> bytes:
+        """The bytes of an image in a format that is READ; those of any other as they are."""
+        data = self.file.image(place)
+        if not data.startswith(ktx2_images.START):
+            return data
+        if place.pointer not in self._decoded:
+            self._decoded[place.pointer] = ktx2_images.as_png(data, self.file.limits, place.pointer)
+        return self._decoded[place.pointer]
 
     def _wrap(self, texture: JsonView, reach: tuple[bool, bool]) -> str:
         """The wrap mode of both axes; where they differ, that of the axis along which the mesh leaves the image."""
