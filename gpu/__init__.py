@@ -37,6 +37,7 @@ from gpu.errors import (
 from gpu.footprint import picture_bytes, scene_bytes
 from gpu.layout.pixel_layers import ACCUMULATOR_BYTES
 from gpu.picture.blocks import Band, border_after, stop_after
+from gpu.picture.look import Lut, ViewTable
 from gpu.picture.picture import Picture
 from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
@@ -62,6 +63,7 @@ __all__ = [
     "EnvironmentArrays",
     "GpuError",
     "KernelKey",
+    "Lut",
     "MovedArrays",
     "NothingRendered",
     "OutOfMemory",
@@ -75,6 +77,7 @@ __all__ = [
     "SceneTooLarge",
     "Steps",
     "TextureArrays",
+    "ViewTable",
     "WrongThread",
     "border_after",
     "devices",

@@ -7,6 +7,7 @@ callback_hosts  where callbacks may be sent
 problems   the errors that callers see, with their HTTP statuses
 colorimetry  sRGB and linear Rec.709
 views      the names of AOVs and tone maps
+displays   the displays and views of OpenColorIO that tone maps may name
 quality    quality presets, and settings with every knob resolved
 file_formats  the formats that are read and written
 state      what the routes share

@@ -98,7 +98,7 @@ def _picture(command: argparse.ArgumentParser) -> None:
     add("--aov", metavar="NAME", help=aovs)
     add("--exposure", metavar="STOPS", help="for .png (default: 0)")
     curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
-    add("--tone-map", metavar="NAME", help=f"for .png: {_any_of(curves)}")
+    add("--tone-map", metavar="NAME", help=f"for .png: {_any_of([*curves, 'ocio:DISPLAY/VIEW'])}")
 
 
 def _sweep(command: argparse.ArgumentParser) -> None:

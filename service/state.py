@@ -13,7 +13,7 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
-from service import file_formats
+from service import displays, file_formats
 from service.batches.batch import Batch
 from service.batches.members import Members
 from service.batches.queue import BatchQueue
@@ -40,6 +40,7 @@ from service.streams.sessions import Sessions
 from service.system.executors import packing
 from service.system.memory import MemoryBudget
 from service.system.shares import Shares
+from service.views import TONE_MAPS
 
 MESSAGE_BYTES = 1 << 20  # of one message on a stream: larger geometry is uploaded as an asset
 MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end
@@ -103,6 +104,7 @@ class AppState:
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),
             "formats": file_formats.told(),
+            "tone_maps": [*TONE_MAPS, *displays.names()],
         }
 
     async def resume_renders(self) -> None:

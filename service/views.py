@@ -1,6 +1,6 @@
 """How a picture may be looked at: the names that the API, the stream, the command line and metadata share.
 
-Nothing heavy is imported here, as the command line's help needs the names. AOVs and tone maps are those of
+Nothing heavy is imported here, as the command line's help needs the names. AOVs and curves are those of
 gpu/settings.py, which the server's process does not import, and formats those of `images`; tests compare them.
 """
 
@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from typing import Final, Literal, get_args
 
+from service.displays import SHORT
+
 Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id", "incidence"]
 AovOrAll = Literal[Aov, "all"]  # "all" is every AOV as a layer of one file
-ToneMap = Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"]
+Curve = Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"]
 Bits = Literal[8, 16]  # of a PNG's channels
 LossyFormat = Literal["jpeg", "webp"]
 LinearFormat = Literal["exr", "hdr", "npy"]
@@ -22,7 +24,8 @@ MapKind = Literal["p", "difference", "flip", "heat"]  # of where two pictures di
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 AOVS: tuple[Aov, ...] = get_args(Aov)
-TONE_MAPS: tuple[ToneMap, ...] = get_args(ToneMap)
+CURVES: tuple[Curve, ...] = get_args(Curve)
+TONE_MAPS = (*CURVES, *SHORT)  # those of short names; `displays.names` has the others
 BSDF_KINDS: tuple[BsdfKind, ...] = get_args(BsdfKind)
 MAPS: tuple[MapKind, ...] = get_args(MapKind)
 LOSSLESS_FORMATS: tuple[LosslessFormat, ...] = get_args(LosslessFormat)

@@ -36,7 +36,7 @@ LARGE_CLASSES = {
 LAYERS = [
     {"service.problems", "service.callback_hosts"},
     {"service.config"},
-    {"service.views", "service.colorimetry"},
+    {"service.views", "service.displays", "service.colorimetry"},
     {"service.system"},
     {"service.logs", "service.ipc"},
     {"service.scene"},
@@ -106,7 +106,9 @@ GL_SIDE = (
 # order, a merge. A door for them in the worker would only pass everything on.
 TOUCHES_GL = ("service.worker", "service.bench")
 OFFLINE = "gpu.tables.build"
-SHARED_BY_PROCESSES = ("service.ipc", "service.system", "service.logs", "service.quality", "service.views")
+SHARED_BY_PROCESSES = (
+    "service.ipc", "service.system", "service.logs", "service.quality", "service.views", "service.displays"
+)  # fmt: skip
 ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
 

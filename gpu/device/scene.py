@@ -15,7 +15,7 @@ from gpu import layout
 from gpu.arrays import EnvironmentArrays, SceneArrays
 from gpu.device import buffers
 from gpu.device.textures import IMAGE_UNITS, KINDS, bound_textures, linear_texture, placeholder
-from gpu.device.uploads import SharedUploads, Taken, Textures
+from gpu.device.uploads import Buffer, SharedUploads, Taken, Textures, UploadCache
 from gpu.errors import OutOfMemory
 from gpu.footprint import unshared_bytes
 from gpu.kernels import features
@@ -181,6 +181,11 @@ class Scene:
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         """The defines that its kernels are compiled with."""
         return features.defines(self._raised, settings, features.counts(self.arrays))
+
+    @property
+    def looks(self) -> UploadCache[Buffer]:
+        """The tables of displays on the device, which all scenes of its context share."""
+        return self._shared.looks
 
     @property
     def flags(self) -> frozenset[str]:

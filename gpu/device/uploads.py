@@ -1,4 +1,4 @@
-"""What several scenes read on the device, uploaded once: images, environments, tables of energy."""
+"""What several scenes read on the device, uploaded once: images, environments, tables of energy and of displays."""
 
 from __future__ import annotations
 
@@ -26,6 +26,20 @@ class Textures(dict[int, Any]):
     def release(self) -> None:
         for texture in self.values():
             texture.release()
+
+
+class Buffer:
+    """A buffer of the device, which belongs to the upload."""
+
+    def __init__(self, buffer: Any) -> None:
+        self.buffer = buffer
+
+    @property
+    def bytes(self) -> int:
+        return int(self.buffer.size)
+
+    def release(self) -> None:
+        self.buffer.release()
 
 
 def _texture_bytes(texture: Any) -> int:
@@ -96,11 +110,12 @@ class SharedUploads:
     images: UploadCache[Textures] = field(default_factory=UploadCache)
     environments: UploadCache[Any] = field(default_factory=UploadCache)
     tables: UploadCache[Textures] = field(default_factory=UploadCache)
+    looks: UploadCache[Buffer] = field(default_factory=UploadCache)
 
     @property
     def bytes(self) -> int:
-        return self.images.bytes + self.environments.bytes + self.tables.bytes
+        return self.images.bytes + self.environments.bytes + self.tables.bytes + self.looks.bytes
 
     def release(self) -> None:
-        for cache in (self.images, self.environments, self.tables):
+        for cache in (self.images, self.environments, self.tables, self.looks):
             cache.release()

@@ -32,6 +32,8 @@ class Slot(IntEnum):
     PLANNED_AREAS = 15
     # meter.comp
     METER_PLACES = 14
+    # resolve.comp: tables of displays and looks
+    TABLES = 13
 
 
 class BlockSlot(IntEnum):

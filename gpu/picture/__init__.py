@@ -14,6 +14,7 @@ noise_meter   a picture's error, from a second, independent estimate of a share 
 readout       a picture's mean, variance, noise and first hits, read from the accumulators
 dispatcher    runs kernels over parts of a picture
 first_hit     AOVs of the first hit
+look          exposure, tone map, primaries and tables of a picture that is shown
 resolve       accumulators to display values, on the device
 display       AOVs as pictures for the eye
 filters       pixel filters as inverse distributions

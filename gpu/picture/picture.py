@@ -17,6 +17,7 @@ from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture import blocks, display, first_hit
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.look import Look, Lut, ViewTable
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
 from gpu.picture.readout import Readout
@@ -240,19 +241,21 @@ class Picture:
         self,
         aov: str = "color",
         exposure: float = 0.0,
-        tone_map: str = "pbr_neutral",
+        tone_map: str | ViewTable = "pbr_neutral",
         dtype: str = "u1",
         color: np.ndarray | None = None,
+        p3: bool = False,
+        lut: Lut | None = None,
     ) -> np.ndarray:
         """Display-encoded (height, width, 4), straight alpha: uint8, or float32 in 0..1 with dtype "f4".
 
-        Colour: exposed (stops), tone-mapped, sRGB; `color` in the place of the picture's own, as `read` gives it.
-        Other AOVs: see `display.encode`.
+        Colour: see `Look`; `color` in the place of the picture's own, as `read` gives it. Other AOVs: see
+        `display.encode`.
         """
         self._need_samples()
         if aov != "color":
             return display.encode(aov, self.read(aov), dtype)
-        return self._readout.display(exposure, tone_map, dtype, color)
+        return self._readout.display(Look(exposure, tone_map, p3, lut), dtype, color)
 
     def release(self) -> None:
         """Release the device's memory."""

@@ -15,6 +15,7 @@ from gpu.picture import noise_meter
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
+from gpu.picture.look import Look
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.resolve import resolve
 from gpu.picture.schedule import Tile, work_groups
@@ -60,7 +61,7 @@ class Readout:
         scale = float(self._dispatcher.scene.arrays.radiance_scale)
         return self._meter.noise(self._sums, samples >= noise_meter.FROM, scale)
 
-    def display(self, exposure: float, tone_map: str, dtype: str, color: np.ndarray | None) -> np.ndarray:
+    def display(self, look: Look, dtype: str, color: np.ndarray | None) -> np.ndarray:
         """Colour as `Picture.display` gives it."""
         d = self._dispatcher
         own: dict[Slot, Any] = {}
@@ -70,7 +71,7 @@ class Readout:
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
             bind = partial(self._sums.bind_alone, own)
         count = self._size[0] * self._size[1]
-        pixels = resolve(d.context, self._kernels, bind, count, d.most_pixels, exposure, tone_map, dtype)
+        pixels = resolve(d.context, self._kernels, d.scene.looks, bind, count, d.most_pixels, look, dtype)
         for buffer in own.values():
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)

@@ -16,6 +16,7 @@ from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
 from gpu.picture import accumulators, noise_meter, resolve
+from gpu.picture.look import Look
 from gpu.settings import TONE_MAPS, RenderSettings
 
 ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common_keys`
@@ -91,7 +92,11 @@ def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[Kerne
 def common_keys() -> list[KernelKey]:
     """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, and those that
     show a picture."""
-    shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
+    shown = [
+        ("resolve.comp", resolve.defines(Look(tone_map=curve), dtype))
+        for curve in TONE_MAPS
+        for dtype in ("u1", "f4")
+    ]
     metered = [("meter.comp", noise_meter.defines(*which)) for which in ((1, 0), (0, 0), (0, 1))]
     summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]
     entries = [*metered, *summed, *shown]  # the first frames of a stream need those first

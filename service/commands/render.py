@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from service import displays
 from service.commands import BadInput, Failed, files
 from service.commands.configuration import configuration
 from service.commands.documents import (
@@ -101,7 +102,7 @@ def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, flo
     if arguments.aov == "all" and format != "exr":
         raise BadInput("--aov all: only an .exr file holds more than one; name one of " + ", ".join(AOVS))
     if arguments.tone_map is not None:
-        _choose("--tone-map", arguments.tone_map, TONE_MAPS)
+        _check_tone_map(arguments.tone_map)
     exposure = None
     if arguments.exposure is not None:
         try:
@@ -134,6 +135,13 @@ def _print_notes(source: Source, output: Output, exposure: float | None, size: t
     if is_model and source.view and exposure is None and output.format == "png":
         stops = f"{source.view.exposure:g}"
         print(f"note: exposure {stops}, which suits the file's lights; --exposure sets another", file=sys.stderr)
+
+
+def _check_tone_map(name: str) -> None:
+    if not name.startswith(displays.PREFIX):
+        _choose("--tone-map", name, (*TONE_MAPS, f"{displays.PREFIX}DISPLAY/VIEW"))
+    elif wrong := displays.mistake(name):
+        raise BadInput(f"--tone-map {name!r}: {wrong}")
 
 
 def _choose(option: str, value: str, known: tuple[str, ...]) -> None:

@@ -12,8 +12,9 @@ from pydantic import Field, TypeAdapter
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings
 from service.scene.base import Model
+from service.scene.look import ToneMap
 from service.scene.validation import validated
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits, ToneMap
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits
 
 
 class PictureView(Model):

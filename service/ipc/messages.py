@@ -54,6 +54,7 @@ class View:
     exposure: float = 0.0
     tone_map: str = DEFAULT_TONE_MAP
     encoding: Encoding = "u1"
+    p3: bool = False  # for a screen with the primaries of Display P3
 
 
 @dataclass(frozen=True)

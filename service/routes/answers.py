@@ -105,6 +105,7 @@ class Info(BaseModel):
     limits: dict[str, Any] = Field(description="What may be sent, by the names of the settings.")
     quality: dict[str, Any] = Field(description="The quality presets, with what they cost.")
     formats: Formats
+    tone_maps: list[str] = Field(description="By what pictures are shown; the short names come first.")
 
 
 class Schemas(BaseModel):

@@ -26,8 +26,9 @@ from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
 from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
+from service.scene.look import ToneMap
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, ToneMap
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE
 
 router = APIRouter(prefix="/v1", tags=["batches"])
 

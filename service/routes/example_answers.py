@@ -69,6 +69,7 @@ INFO: dict[str, Any] = {
         "compressions": ["draco", "meshopt"],
         "missing": {"ktx2": "opengl-basisu"},
     },
+    "tone_maps": ["linear", "agx", "aces2", "ocio:Display P3 - Display/ACES 2.0 - SDR 100 nits (P3 D65)"],
 }
 SCHEMAS = {
     "scene": {"title": "Scene", "type": "object", "required": ["version", "camera", "materials", "shapes"]},

@@ -26,9 +26,10 @@ from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
+from service.scene.look import ToneMap
 from service.state import MOST_WAITS, app_state, caller_of, owner_of
 from service.system.executors import writing
-from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
+from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 

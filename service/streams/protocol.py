@@ -12,9 +12,10 @@ from service import images
 from service.ipc import messages
 from service.problems import TooLarge
 from service.scene.base import Model, hint
+from service.scene.look import ToneMap
 from service.scene.text import load_json, most_bytes
 from service.scene.validation import validated
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, StreamFormat, ToneMap
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, StreamFormat
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact

@@ -12,6 +12,8 @@ from gpu.kernels import features, models_glsl, source
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
 from gpu.layout.models import FLAGGED, Model
+from gpu.picture import resolve
+from gpu.picture.look import Look
 
 
 def _folder(tmp_path: Path, **files: str) -> tuple[Path, ...]:
@@ -72,7 +74,7 @@ def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     everything = features.defines(features.everything())
     for entry in ("pathtrace.comp", "guides.comp"):
         KernelSource(entry, everything)  # raises where a name in #if is not defined
-    KernelSource("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})
+    KernelSource("resolve.comp", {**everything, **resolve.defines(Look(), "u1")})
 
 
 @pytest.mark.parametrize("model", FLAGGED, ids=lambda model: model.name)

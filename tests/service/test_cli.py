@@ -285,7 +285,7 @@ def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: py
 
 
 def test_choices_are_those_of_the_renderer() -> None:
-    assert (views.AOVS, views.TONE_MAPS) == (gpu_settings.AOVS, gpu_settings.TONE_MAPS)
+    assert (views.AOVS, views.CURVES) == (gpu_settings.AOVS, gpu_settings.TONE_MAPS)
     assert tuple(images.LAYERS) == views.AOVS and views.DEFAULT_TONE_MAP in views.TONE_MAPS
 
 

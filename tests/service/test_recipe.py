@@ -81,7 +81,7 @@ def test_what_is_given_comes_first(gpu: Any, scene: Path, tmp_path: Path) -> Non
     assert made is not None and made["settings"]["max_bounces"] == 5 and made["settings"]["seed"] == 7
 
 
-@pytest.mark.parametrize("query", [{"bits": 16, "exposure": 0.5}, {"tone_map": "aces"}, {"aov": "depth"}])
+@pytest.mark.parametrize("query", [{"bits": 16, "exposure": 0.5}, {"tone_map": "aces2"}, {"aov": "depth"}])
 def test_a_servers_picture_again(server: Server, tmp_path: Path, query: dict[str, Any]) -> None:
     """It was not ended by a number of samples: the picture says how many there were, and they are what the limit is
     now."""

@@ -116,6 +116,7 @@ def test_image_shapes_and_depths(http: httpx.Client) -> None:
         ("exposure=nan", "exposure"),
         ("exposure=61", "exposure"),
         ("tone_map=filmic", "tone_map"),
+        ("tone_map=ocio:sRGB - Display/ACES 1.0", "tone_map"),
         ("tonemap=aces", "tonemap"),
     ],
 )

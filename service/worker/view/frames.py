@@ -10,12 +10,14 @@ import numpy as np
 from gpu import FIRST_HIT_AOVS, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
+from service.displays import view_of
 from service.ipc.messages import Frame, Image, Read, Reason, View, Want
 from service.worker.context import WorkerContext
 from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
 from service.worker.view.denoise_policy import Denoised, DenoisePolicy
+from service.worker.view.view_tables import view_table
 
 if TYPE_CHECKING:
     from gpu import Picture
@@ -242,4 +244,6 @@ def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarra
     color = clean.pixels if clean else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
-    return picture.display(view.aov, view.exposure, view.tone_map, view.encoding, color)
+    named = view_of(view.tone_map, view.p3)
+    tone_map = view_table(*named) if named else view.tone_map
+    return picture.display(view.aov, view.exposure, tone_map, view.encoding, color, view.p3)

@@ -29,6 +29,7 @@ def client(server: Server) -> Iterator[Client]:
         ({"format": "jpeg", "aov": "normal"}, "image/jpeg"),
         ({"format": "png", "aov": "depth", "exposure": 2}, "image/png"),
         ({"tone_map": "aces", "exposure": -1.5}, "image/jpeg"),
+        ({"tone_map": "aces2"}, "image/jpeg"),
     ],
 )
 def test_a_view_is_answered_when_done(client: Client, view: dict[str, Any], mime: str) -> None:

@@ -1,0 +1,81 @@
+"""Tables of colours on the device: views of OpenColorIO against its own processor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpu import Picture, Renderer
+from service import displays
+from service.worker.view import view_tables
+from tests.rendering import document, picture
+
+SIDE = 96
+ACES2 = displays.SHORT["aces2"][0]
+
+
+@pytest.fixture(scope="module")
+def canvas(gpu: Renderer) -> Picture:
+    """A picture whose size is that of the colours that are shown in its place."""
+    return picture(gpu, document([]), 1, width=SIDE, height=SIDE, max_bounces=0)
+
+
+@pytest.fixture(scope="module")
+def colors() -> np.ndarray:
+    """Radiance of all saturations from 0.002 to 128, opaque; the first row is black and greys."""
+    rng = np.random.default_rng(2)
+    grey = np.exp2(rng.uniform(-9, 7, (SIDE, SIDE, 1)))
+    out = np.ones((SIDE, SIDE, 4), np.float32)
+    out[..., :3] = grey * (1 - rng.uniform(0, 1, (SIDE, SIDE, 1)) * rng.uniform(0, 1, (SIDE, SIDE, 3)))
+    out[0, :, :3] = np.linspace(0, 4, SIDE)[:, None]
+    return out
+
+
+def test_names_are_those_of_the_library() -> None:
+    import OpenImageIO as oiio
+
+    config = oiio.ColorConfig(displays.CONFIGURATION)
+    assert not config.geterror() and displays.SOURCE in config.getColorSpaceNames()
+    there = {name: tuple(config.getViewNames(name)) for name in config.getDisplayNames()}
+    del there["Display P3 HDR - Display"]
+    assert there == {name: row.views for name, row in displays.DISPLAYS.items()}
+    assert all(displays.mistake(name) is None for name in displays.names())
+
+
+@pytest.mark.parametrize(
+    ("view", "mean", "most"),  # errors in steps of 8 bits
+    [
+        (ACES2, 0.09, 2.2),
+        (displays.SHORT["aces2"][1], 0.09, 2.2),
+        (("Rec.2100-PQ - Display", "ACES 2.0 - HDR 1000 nits (Rec.2020)"), 0.09, 1.2),
+        (("sRGB - Display", "Un-tone-mapped"), 0.09, 0.3),
+        (("P3-D65 - Display", "Un-tone-mapped"), 0.1, 6.0),
+    ],
+)
+@pytest.mark.parametrize("exposure", [0.0, -1.5])
+def test_views_are_the_librarys(
+    canvas: Picture, colors: np.ndarray, view: tuple[str, str], mean: float, most: float, exposure: float
+) -> None:
+    table = view_tables.view_table(*view)
+    exact = np.clip(view_tables.exact(colors[..., :3] * 2**exposure, *view), 0, 1)
+    floats = canvas.display(tone_map=table, exposure=exposure, dtype="f4", color=colors)
+    error = np.abs(floats[..., :3] - exact).max(axis=-1) * 255
+    assert error.mean() < mean and error.max() < most
+    assert np.abs(canvas.display(tone_map=table, exposure=exposure, color=colors) / 255 - floats).max() < 0.51 / 255
+
+
+def test_greys_stay_grey_and_in_order(canvas: Picture, colors: np.ndarray) -> None:
+    shown = canvas.display(tone_map=view_tables.view_table(*ACES2), dtype="f4", color=colors)[0, :, :3]
+    assert np.ptp(shown, axis=1).max() < 2e-3 and (np.diff(shown[:, 1]) > 0).all() and shown[0].max() < 1e-3
+
+
+def test_a_view_is_baked_once() -> None:
+    assert view_tables.view_table(*ACES2) is view_tables.view_table(*ACES2)
+
+
+@pytest.mark.parametrize("radiance", [0.0, 1e20, 3e38])
+def test_views_end_in_their_limits(canvas: Picture, colors: np.ndarray, radiance: float) -> None:
+    lit = np.broadcast_to(np.float32([radiance, 0, radiance, 1]), colors.shape)
+    for exposure in (-60.0, 60.0):
+        shown = canvas.display(tone_map=view_tables.view_table(*ACES2), exposure=exposure, dtype="f4", color=lit)
+        assert np.isfinite(shown).all() and (shown >= 0).all() and (shown <= 1).all()
