@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module, metadata
 
 from service.commands import CommandError
-from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, MAPS, TONE_MAPS
+from service.views import AOVS, BSDF_KINDS, COLOR_SPACES, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, MAPS, TONE_MAPS
 
 BENCHES = ("speed", "gpu", "tradeoff", "seeds", "scale")
 
@@ -99,6 +99,7 @@ def _picture(command: argparse.ArgumentParser) -> None:
     add("--exposure", metavar="STOPS", help="for .png (default: 0)")
     curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
     add("--tone-map", metavar="NAME", help=f"for .png: {_any_of([*curves, 'ocio:DISPLAY/VIEW'])}")
+    add("--color-space", metavar="NAME", help=f"for .png: {_any_of(COLOR_SPACES)}")
 
 
 def _sweep(command: argparse.ArgumentParser) -> None:

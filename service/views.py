@@ -13,6 +13,7 @@ from service.displays import SHORT
 Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id", "incidence"]
 AovOrAll = Literal[Aov, "all"]  # "all" is every AOV as a layer of one file
 Curve = Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"]
+ColorSpace = Literal["srgb", "display_p3"]  # of a displayed picture
 Bits = Literal[8, 16]  # of a PNG's channels
 LossyFormat = Literal["jpeg", "webp"]
 LinearFormat = Literal["exr", "hdr", "npy"]
@@ -24,6 +25,7 @@ MapKind = Literal["p", "difference", "flip", "heat"]  # of where two pictures di
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 AOVS: tuple[Aov, ...] = get_args(Aov)
+COLOR_SPACES: tuple[ColorSpace, ...] = get_args(ColorSpace)
 CURVES: tuple[Curve, ...] = get_args(Curve)
 TONE_MAPS = (*CURVES, *SHORT)  # those of short names; `displays.names` has the others
 BSDF_KINDS: tuple[BsdfKind, ...] = get_args(BsdfKind)

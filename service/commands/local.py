@@ -19,12 +19,14 @@ from service import images
 from service.commands.documents import Source, source_assets
 from service.commands.tracing import Interrupt, Tracing
 from service.config import Config, load_config
+from service.displays import SRGB
 from service.images.recipe import PictureView, write
 from service.ipc.messages import View
 from service.pack import pack
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError, problem
 from service.quality import resolve
 from service.scene import parse_scene, parse_settings
+from service.scene.look import shown_as
 from service.scene.validation import both, validated
 from service.views import AOVS, FileFormat
 from service.worker.in_process import InProcessRenderer
@@ -77,7 +79,7 @@ class LocalPicture:
         self.status = status
 
     def encoded(self, format: FileFormat, view: Mapping[str, Any]) -> bytes:
-        """A file; `view`: aov, bits, exposure, tone_map. Raises InvalidDocument."""
+        """A file; `view`: aov, bits, exposure, tone_map, color_space. Raises InvalidDocument."""
         row = images.FORMATS.get(format)
         if row is None:
             raise InvalidDocument(
@@ -94,8 +96,10 @@ class LocalPicture:
                 raise InvalidDocument([FieldError("/aov", "all is for exr alone")])
             layers: dict[str, Any] = {aov: self._tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}
             return images.encode_layers(layers, made_from)
-        pixels = self._tracing.pixels(View(look.aov, look.exposure, look.tone_map, row.encoding(look.bits)))
-        return images.encode(pixels, format, bits=look.bits, metadata=made_from)
+        stands = shown_as(look.tone_map, look.color_space, format) if look.aov == "color" else SRGB
+        p3 = look.color_space == "display_p3"
+        pixels = self._tracing.pixels(View(look.aov, look.exposure, look.tone_map, row.encoding(look.bits), p3))
+        return images.encode(pixels, format, bits=look.bits, metadata=made_from, encoding=stands)
 
     def close(self) -> None:
         """Free its memory on the GPU."""

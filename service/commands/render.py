@@ -26,7 +26,7 @@ from service.commands.documents import (
     refusals,
     source_assets,
 )
-from service.views import AOVS, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
+from service.views import AOVS, COLOR_SPACES, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
@@ -103,6 +103,8 @@ def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, flo
         raise BadInput("--aov all: only an .exr file holds more than one; name one of " + ", ".join(AOVS))
     if arguments.tone_map is not None:
         _check_tone_map(arguments.tone_map)
+    if arguments.color_space is not None:
+        _choose("--color-space", arguments.color_space, COLOR_SPACES)
     exposure = None
     if arguments.exposure is not None:
         try:
@@ -120,10 +122,19 @@ def _view(
 ) -> PictureView:
     """The view as given; the rest comes from the picture that is made again, if it is one."""
     from service.images.recipe import PictureView
+    from service.scene.look import shown_as
 
-    options = {"aov": arguments.aov, "exposure": exposure, "tone_map": arguments.tone_map}
+    options = {
+        "aov": arguments.aov,
+        "exposure": exposure,
+        "tone_map": arguments.tone_map,
+        "color_space": arguments.color_space,
+    }
     given = {name: value for name, value in options.items() if value is not None}
     view = (before or PictureView()).model_copy(update=given)
+    if format == "png":
+        with refusals():
+            shown_as(view.tone_map, view.color_space)
     return view.model_copy(update={"aov": "color"}) if view.aov == "all" and format != "exr" else view
 
 
@@ -160,5 +171,7 @@ def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, st
     if view.aov == "all":
         return images.encode_layers({aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from)
     encoding = images.FORMATS[output.format].encoding(view.bits)
-    pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding))
-    return images.encode(pixels, output.format, bits=view.bits, metadata=made_from)
+    p3 = view.color_space == "display_p3"
+    pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding, p3))
+    stands = displays.encoding_of(view.tone_map, p3) if view.aov == "color" else displays.SRGB
+    return images.encode(pixels, output.format, bits=view.bits, metadata=made_from, encoding=stands)

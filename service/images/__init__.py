@@ -2,6 +2,7 @@
 
 encoders       how each format is written
 metadata       the metadata of PNG and EXR files
+icc            what the numbers of a picture stand for, as files say it
 recipe         the scene and settings that a picture was made from, in that metadata
 contact_sheet  many pictures on one, each with its name
 animation      pictures one after the other
@@ -14,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import BinaryIO
 
+from service import displays
 from service.images.encoders import (
     Array,
     Choices,
@@ -93,13 +95,15 @@ def encode(
     bits: int = 8,
     quality: int | None = None,
     metadata: Metadata | None = None,
+    encoding: displays.Encoding = displays.SRGB,
 ) -> bytes:
     """A file of one of FORMATS; `pixels` is (height, width, channels), row 0 at the top.
 
     Displayed formats take display-encoded values with straight alpha, uint8 or float 0..1; JPEG is composited over
     black. The others take linear float32, colour premultiplied; HDR drops alpha. `bits`, 8 or 16, is for PNG alone.
+    `encoding` is what displayed values stand for, which their files say.
     """
-    row, choices = _row(format), Choices(bits, quality, metadata)
+    row, choices = _row(format), Choices(bits, quality, metadata, encoding)
     if row.by_openimageio:
         return in_memory(lambda file: row.write(file, _three_axes(pixels), choices))
     file = io.BytesIO()  # in_memory takes 40 times as long for rgba32f
@@ -114,9 +118,10 @@ def write(
     *,
     bits: int = 8,
     metadata: Metadata | None = None,
+    encoding: displays.Encoding = displays.SRGB,
 ) -> None:
     """Write the bytes of `encode` to an empty file with a descriptor, large formats without a copy in memory."""
-    _row(format).write(file, _three_axes(pixels), Choices(bits, metadata=metadata))
+    _row(format).write(file, _three_axes(pixels), Choices(bits, metadata=metadata, encoding=encoding))
 
 
 def encode_layers(layers: dict[str, Array], metadata: Metadata | None = None) -> bytes:

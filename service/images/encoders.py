@@ -16,7 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from service.images.metadata import KEY, png_with_text
+from service.displays import SRGB, Encoding
+from service.images import icc
+from service.images.metadata import KEY, png_with_encoding, png_with_text
 
 QUALITY = 80
 FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
@@ -36,10 +38,19 @@ class Choices:
     bits: int = 8
     quality: int | None = None
     metadata: Metadata | None = None
+    encoding: Encoding = SRGB  # what the values of a displayed format stand for
+
+    @property
+    def profile(self) -> dict[str, Any]:
+        """Pillow's option for the ICC profile; sRGB is what a picture without one is taken for."""
+        made = None if self.encoding == SRGB else icc.profile(self.encoding)
+        return {} if made is None else {"icc_profile": made}
 
 
 def write_png(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     png = _png16(pixels) if choices.bits == 16 else _pillow(_bytes(pixels), "PNG", compress_level=PNG_LEVEL)
+    if choices.encoding != SRGB:
+        png = png_with_encoding(png, icc.cicp(choices.encoding), icc.profile(choices.encoding))
     file.write(png if choices.metadata is None else png_with_text(png, _text(choices.metadata)))
 
 
@@ -47,18 +58,19 @@ def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     """Write a JPEG, over black, as it has no alpha."""
     quality = QUALITY if choices.quality is None else choices.quality
     sampling = "4:4:4" if quality >= FULL_COLOUR else "4:2:0"
-    file.write(_pillow(over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling))
+    file.write(_pillow(over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling, **choices.profile))
 
 
 def write_webp(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     quality = QUALITY if choices.quality is None else choices.quality
-    file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2))
+    file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2, **choices.profile))
 
 
 def write_avif(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     """8 bits, colour at full resolution."""
     quality = FULL_COLOUR if choices.quality is None else choices.quality
-    file.write(_pillow(_bytes(pixels), "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED))
+    options = {"quality": quality, "subsampling": "4:4:4", "speed": AVIF_SPEED}
+    file.write(_pillow(_bytes(pixels), "AVIF", **options, **choices.profile))
 
 
 def write_exr(file: BinaryIO, pixels: Array, choices: Choices) -> None:
@@ -124,6 +136,10 @@ def _write(
         spec.alpha_channel = channels.index("A") if "A" in channels else -1
     for name, value in attributes.items():
         spec.attribute(name, value)
+    if format == "openexr":
+        places = [coordinate for xy in (*icc.PRIMARIES["rec709"], icc.WHITE) for coordinate in xy]
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), places)
+        spec.attribute("colorInteropID", "lin_rec709_scene")  # by the Color Interop Forum's recommendation
     output = oiio.ImageOutput.create(format)
     assert output is not None, f"this OpenImageIO writes no {format}"
     # OpenImageIO takes a name and no descriptor; this is the name of an open file.

@@ -48,10 +48,32 @@ def png_with_text(png: bytes, text: str) -> bytes:
     """The PNG with a text chunk after its header, deflated where it is long; the text must be ASCII."""
     data = text.encode("ascii")
     long = len(data) > LONG_TEXT
-    body = b"zTXt" + KEY.encode() + b"\0\0" + zlib.compress(data) if long else b"tEXt" + KEY.encode() + b"\0" + data
-    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    key = KEY.encode() + b"\0"
+    chunk = _chunk(b"zTXt", key + b"\0" + zlib.compress(data)) if long else _chunk(b"tEXt", key + data)
     header = len(PNG_MAGIC) + 25  # IHDR is always 25 bytes long
     return png[:header] + chunk + png[header:]
+
+
+def png_with_encoding(png: bytes, codes: tuple[int, int] | None, profile: bytes | None) -> bytes:
+    """The PNG with these codes of primaries and transfer (ITU-T H.273) and this ICC profile, and nothing else about
+    its colours."""
+    chunks = b""
+    if codes is not None:
+        chunks += _chunk(b"cICP", bytes([*codes, 0, 1]))  # RGB, full range
+    if profile is not None:
+        chunks += _chunk(b"iCCP", b"ICC\0\0" + zlib.compress(profile))
+    header = len(PNG_MAGIC) + 25
+    at, kept = header, [png[:header], chunks]
+    while at + 12 <= len(png):
+        size, kind = struct.unpack_from(">I4s", png, at)
+        if kind not in (b"sRGB", b"gAMA", b"cHRM", b"iCCP", b"cICP"):
+            kept.append(png[at : at + 12 + size])
+        at += 12 + size
+    return b"".join(kept)
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def _png_texts(data: bytes) -> Iterator[tuple[bytes, bytes]]:

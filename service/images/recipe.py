@@ -14,7 +14,7 @@ from service.quality import ResolvedSettings
 from service.scene.base import Model
 from service.scene.look import ToneMap
 from service.scene.validation import validated
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits, ColorSpace
 
 
 class PictureView(Model):
@@ -24,6 +24,7 @@ class PictureView(Model):
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
     tone_map: ToneMap = DEFAULT_TONE_MAP
     bits: Bits = 8
+    color_space: ColorSpace = "srgb"
 
 
 class _Recipe(Model):
@@ -57,7 +58,7 @@ def write(
         "scene": scene,
         "settings": settings.again(samples),
         "samples": samples,
-        "view": view.model_dump(),
+        "view": view.model_dump(exclude={"color_space"} if view.color_space == "srgb" else None),
     }
     return written | {"assets": assets} if assets else written
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service import images
 from service.batches.batch import Batch
 from service.config import MIB
+from service.displays import SRGB
 from service.images import animation
 from service.images.animation import AnimationFormat
 from service.ipc.messages import View
@@ -26,7 +27,7 @@ from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
 from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
-from service.scene.look import ToneMap
+from service.scene.look import ToneMap, shown_as
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE
 
@@ -46,6 +47,9 @@ class Shown(BaseModel):
     tone_map: ToneMap = DEFAULT_TONE_MAP
 
     def view(self) -> View:
+        if shown_as(self.tone_map, "srgb") != SRGB:
+            detail = "names another display than sRGB's, for which sheets and animations are"
+            raise InvalidDocument([FieldError("/tone_map", detail)])
         return View("color", self.exposure, self.tone_map, "u1")
 
 

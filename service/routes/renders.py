@@ -17,6 +17,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import images, views
+from service.displays import SRGB
 from service.http.downloads import Downloads, FileAnswer, Written, present
 from service.images import recipe
 from service.ipc.messages import View
@@ -26,7 +27,7 @@ from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
-from service.scene.look import ToneMap
+from service.scene.look import ToneMap, shown_as
 from service.state import MOST_WAITS, app_state, caller_of, owner_of
 from service.system.executors import writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat
@@ -77,13 +78,16 @@ class ImageQuery(BaseModel):
     aov: AovOrAll = "color"
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
     tone_map: ToneMap = DEFAULT_TONE_MAP
+    color_space: views.ColorSpace = "srgb"
 
     def view(self) -> View:
         if self.bits == Bits.SIXTEEN and 16 not in images.FORMATS[self.format].bits:
             raise InvalidDocument([FieldError("/bits", f"16 is for png; a {self.format} file has its own")])
         if self.aov == "all" and self.format != "exr":
             raise InvalidDocument([FieldError("/aov", "all is for exr: no other format holds more than one")])
-        return View(self.aov, self.exposure, self.tone_map, images.FORMATS[self.format].encoding(self.bits))
+        shown_as(self.tone_map, self.color_space, self.format)
+        encoding, p3 = images.FORMATS[self.format].encoding(self.bits), self.color_space == "display_p3"
+        return View(self.aov, self.exposure, self.tone_map, encoding, p3)
 
 
 @router.post(
@@ -315,9 +319,12 @@ def _write(
     bits: views.Bits = 16 if query.bits == Bits.SIXTEEN else 8
     made_from = None
     if images.FORMATS[query.format].has_metadata:
-        view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
+        view = recipe.PictureView(
+            aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits, color_space=query.color_space
+        )
         made_from = recipe.write_text(unfolded(document), job.order.settings, samples, view)
     if query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:
-        images.write(file, layers[query.aov], query.format, bits=bits, metadata=made_from)
+        stands = shown_as(query.tone_map, query.color_space) if query.aov == "color" else SRGB
+        images.write(file, layers[query.aov], query.format, bits=bits, metadata=made_from, encoding=stands)

@@ -16,7 +16,7 @@ axes            what varies from one render of a batch to the next
 references      the assets that a document refers to
 saved_material  a material as users save it, with its textures
 brief           a material's model in few words
-look            the tone map by which a picture is shown
+look            the tone map and the colour space by which a picture is shown
 schema          the schema that editors are made from
 """
 

@@ -1,4 +1,4 @@
-"""By what a picture is shown: the tone map, as requests and metadata name it."""
+"""By what a picture is shown: its tone map and its colour space, as requests and metadata name them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Annotated
 from pydantic import AfterValidator, WithJsonSchema
 
 from service import displays
+from service.problems import FieldError, InvalidDocument
 from service.scene.base import refusal
-from service.views import TONE_MAPS
+from service.views import TONE_MAPS, ColorSpace
 
 
 def _known(tone_map: str) -> str:
@@ -23,6 +24,18 @@ def _known(tone_map: str) -> str:
 
 def _among() -> str:
     return f"must be one of {', '.join(TONE_MAPS)}, or {displays.PREFIX}DISPLAY/VIEW, which GET /v1/info lists"
+
+
+def shown_as(tone_map: str, color_space: ColorSpace, format: str = "png") -> displays.Encoding:
+    """What the numbers of a file stand for. Raises InvalidDocument where its format cannot say so."""
+    p3 = color_space == "display_p3"
+    encoding = displays.encoding_of(tone_map, p3)
+    if p3 and encoding != displays.DISPLAY_P3:
+        raise InvalidDocument([FieldError("/color_space", "must be left out: the tone map names another display")])
+    if encoding.transfer == "pq" and format in ("jpeg", "webp", "avif"):
+        detail = f"is for an HDR display (PQ), which a {format} file here cannot say: png can"
+        raise InvalidDocument([FieldError("/tone_map", detail)])
+    return encoding
 
 
 # The short names come first: they are what an editor offers.

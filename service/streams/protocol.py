@@ -9,13 +9,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from service import images
+from service.displays import SRGB, encoding_of
 from service.ipc import messages
 from service.problems import TooLarge
 from service.scene.base import Model, hint
 from service.scene.look import ToneMap
 from service.scene.text import load_json, most_bytes
 from service.scene.validation import validated
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, StreamFormat
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, ColorSpace, StreamFormat
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact
@@ -37,13 +38,18 @@ class View(Model):
         ToneMap,
         hint("Tone map", "How radiance beyond white is brought onto the screen."),
     ] = DEFAULT_TONE_MAP
+    color_space: ColorSpace = "srgb"
     aov: Aov = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
     bits: Annotated[Bits, Field(description="Of a PNG's channels.")] = 8
 
     def for_renderer(self) -> messages.View:
         encoding = images.FORMATS[self.format].encoding(self.bits)
-        return messages.View(self.aov, self.exposure, self.tone_map, encoding)
+        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3)
+
+    @property
+    def p3(self) -> bool:
+        return self.color_space == "display_p3"
 
     def over(self, view: View) -> View:
         """`view` with the fields that this message gives."""
@@ -94,7 +100,8 @@ def parse(text: str) -> Message:
 def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
     """A frame's message: header length, header, image. Takes milliseconds."""
     quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
-    body = images.encode(frame.pixels, view.format, bits=view.bits, quality=quality)
+    stands = encoding_of(view.tone_map, view.p3) if view.aov == "color" else SRGB
+    body = images.encode(frame.pixels, view.format, bits=view.bits, quality=quality, encoding=stands)
     height, width = frame.pixels.shape[:2]
     progress = frame.progress
     header = {

@@ -5,14 +5,19 @@ from __future__ import annotations
 import io
 import json
 import os
+import struct
 import zlib
 from typing import Any, get_args
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageCms
 
-from service import images, views
+from service import displays, images, views
+from service.colorimetry import decode_srgb as srgb_to_linear
+from service.colorimetry import encode_srgb
+from service.images import icc
+from service.images.metadata import exr_attributes
 from tests.asset_files import png, read_exr, read_hdr, read_png
 
 RNG = np.random.default_rng(3)
@@ -43,6 +48,14 @@ def read_by_openimageio(data: bytes) -> np.ndarray:
         return np.asarray(file.read_image("uint8")).reshape(file.spec().height, file.spec().width, -1)
     finally:
         os.close(fd)
+
+
+def png_chunks(png: bytes) -> dict[bytes, bytes]:
+    at, found = 8, {}
+    while at < len(png):
+        size, kind = struct.unpack_from(">I4s", png, at)
+        found[kind], at = png[at + 8 : at + 8 + size], at + 12 + size
+    return found
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -176,6 +189,46 @@ def test_exr_carries_metadata() -> None:
         images.encode_layers({"color": linear()}, METADATA),
     ):
         assert images.read_metadata(data) == METADATA
+
+
+@pytest.mark.parametrize(
+    ("encoding", "codes"),
+    [(displays.DISPLAY_P3, b"\x0c\x0d\0\1"), (displays.Encoding("p3", 2.6), None),
+     (displays.Encoding("rec2020", "pq"), b"\x09\x10\0\1")],
+)  # fmt: skip
+@pytest.mark.parametrize("bits", [8, 16])
+def test_png_says_what_it_stands_for(encoding: displays.Encoding, codes: bytes | None, bits: int) -> None:
+    file = images.encode(np.full((2, 2, 4), 0.5, np.float32), "png", bits=bits, metadata=METADATA, encoding=encoding)
+    chunks = png_chunks(file)
+    assert chunks.get(b"cICP") == codes and (b"iCCP" in chunks) == (encoding.transfer != "pq")
+    assert not {b"sRGB", b"gAMA", b"cHRM"} & set(chunks) and images.read_metadata(file) == METADATA
+    Image.open(io.BytesIO(file)).load()
+
+
+@pytest.mark.parametrize("format", ["png", "jpeg", "webp", "avif"])
+@pytest.mark.parametrize("encoding", [displays.DISPLAY_P3, displays.Encoding("rec709", 2.2)], ids=str)
+def test_profiles_lead_to_the_right_colour(format: views.FileFormat, encoding: displays.Encoding) -> None:
+    """Little CMS finds the sRGB values that the matrices of the standards give."""
+    shown = np.array([0.8, 0.5, 0.4])
+    curve = srgb_to_linear(shown) if encoding.transfer == "srgb" else shown ** float(encoding.transfer)
+    to_srgb = np.linalg.inv(icc.xyz_matrix(icc.PRIMARIES["rec709"])) @ icc.xyz_matrix(
+        icc.PRIMARIES[encoding.primaries]
+    )
+    expected = encode_srgb(to_srgb @ curve) * 255
+    pixels = np.broadcast_to(np.float32([*shown, 1]), (16, 16, 4))
+    picture = Image.open(io.BytesIO(images.encode(pixels, format, quality=100, encoding=encoding)))
+    profile = ImageCms.ImageCmsProfile(io.BytesIO(picture.info["icc_profile"]))
+    found = ImageCms.profileToProfile(picture.convert("RGB"), profile, ImageCms.createProfile("sRGB"))
+    assert found is not None and np.abs(np.asarray(found)[8, 8] - expected).max() < 2.5
+    assert "icc_profile" not in Image.open(io.BytesIO(images.encode(pixels, format))).info
+
+
+def test_exr_says_its_primaries() -> None:
+    found = exr_attributes(images.encode(linear(), "exr"))
+    assert struct.unpack("<8f", found["chromaticities"]) == pytest.approx(
+        [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]
+    )
+    assert found["colorInteropID"] == b"lin_rec709_scene"
 
 
 def test_other_text_chunks_are_read() -> None:

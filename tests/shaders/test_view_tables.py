@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from gpu import Picture, Renderer
+from gpu.picture.display import srgb
 from service import displays
+from service.colorimetry import decode_srgb
+from service.images import icc
 from service.worker.view import view_tables
 from tests.rendering import document, picture
 
@@ -67,6 +70,21 @@ def test_views_are_the_librarys(
 def test_greys_stay_grey_and_in_order(canvas: Picture, colors: np.ndarray) -> None:
     shown = canvas.display(tone_map=view_tables.view_table(*ACES2), dtype="f4", color=colors)[0, :, :3]
     assert np.ptp(shown, axis=1).max() < 2e-3 and (np.diff(shown[:, 1]) > 0).all() and shown[0].max() < 1e-3
+
+
+@pytest.mark.parametrize("tone_map", ["linear", "reinhard", "agx"])
+def test_curves_in_the_primaries_of_p3(canvas: Picture, colors: np.ndarray, tone_map: str) -> None:
+    """Curves run in those of the screen; what was fitted for Rec.709 runs there, and its result is converted."""
+    matrix = np.linalg.inv(icc.xyz_matrix(icc.PRIMARIES["p3"])) @ icc.xyz_matrix(icc.PRIMARIES["rec709"])
+    radiance = colors[..., :3].astype(float)
+    if tone_map == "agx":
+        narrow = canvas.display(tone_map=tone_map, dtype="f4", color=colors)[..., :3]
+        expected = decode_srgb(narrow) @ matrix.T
+    else:
+        wide = radiance @ matrix.T
+        expected = wide if tone_map == "linear" else wide / (1 + wide)
+    shown = canvas.display(tone_map=tone_map, dtype="f4", color=colors, p3=True)[..., :3]
+    np.testing.assert_allclose(shown, srgb(np.clip(expected, 0, 1)), atol=5e-5)
 
 
 def test_a_view_is_baked_once() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import random
 from itertools import pairwise
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
+from service import displays, images
 from service.scene.transform import Transform
 from tests.web.modules import call
 
@@ -341,3 +343,35 @@ def test_a_scene_is_added_under_free_names(page: Page) -> None:
         "paint-3": {"type": "diffuse", "normal_map": {"texture": "bumps"}},
     }
     assert [shape["material"] for shape in taken["shapes"]] == ["paint-2", "paint-3"]
+
+
+@pytest.mark.parametrize("gamut", ["srgb", "p3"])
+def test_a_canvas_keeps_what_the_screen_shows(page: Page, gamut: str) -> None:
+    """A red beyond sRGB's stays on the canvas of a wide screen; what is read from it is sRGB in any case."""
+    features = [{"name": "color-gamut", "value": gamut}]
+    page.context.new_cdp_session(page).send("Emulation.setEmulatedMedia", {"features": features})
+    page.reload()
+    red = np.zeros((8, 8, 3), np.uint8) + np.uint8([255, 0, 0])
+    picture = base64.b64encode(images.encode(red, "png", encoding=displays.DISPLAY_P3)).decode()
+    found = page.evaluate(
+        """async (picture) => {
+        const { Viewport } = await import(new URL("picture/viewport.js", location));
+        const { viewOf } = await import(new URL("document/picture-view.js", location));
+        const canvas = document.createElementNS("http://www.w3.org/1999/xhtml", "canvas");
+        const bytes = Uint8Array.from(atob(picture), (each) => each.charCodeAt(0));
+        const painted = new Promise((painted) => {
+            const header = { seq: 0, width: 8, height: 8, scale: 1, mime: "image/png" };
+            const view = { aov: "color", format: "png" };
+            const viewport = new Viewport(canvas, { painted: () => painted(viewport), names: () => [] });
+            viewport.show(header, bytes, view, () => {});
+        });
+        const srgb = (await painted).pixel({ x: 0.5, y: 0.5 });
+        const wide = canvas.getContext("2d").getImageData(4, 4, 1, 1, { colorSpace: "display-p3" }).data;
+        const asked = viewOf({ layer: "color" }, {}, {});
+        return { srgb, wide: [...wide], asked: asked.color_space };
+    }""",
+        picture,
+    )
+    assert found["srgb"] == [255, 0, 0, 255]
+    assert (found["wide"][0] > 250) == (gamut == "p3")
+    assert found["asked"] == {"p3": "display_p3", "srgb": "srgb"}[gamut]

@@ -3,6 +3,9 @@
 // What of a view is a matter of taste; the rest is how the stream carries it.
 export const DISPLAY = ["exposure", "tone_map"];
 
+// Whether the screen shows more colours than sRGB has: frames then come in Display P3, and the canvas keeps them so.
+export const isWide = matchMedia("(color-gamut: p3)").matches;
+
 // Colour as it is; albedo and normal as the server encodes them; the rest as numbers that are painted here.
 const PAINTED = ["depth", "variance", "shape_id", "material_id"];
 
@@ -45,6 +48,7 @@ export function viewOf(ui, view, { isPaused, quality, isExact }) {
     ...view,
     aov: layer,
     bits: 8,
+    color_space: isWide && layer === "color" && !isExact ? "display_p3" : "srgb",
     quality: isPaused ? quality : null,
     format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
     max_fps: painted ? 4 : isExact ? 8 : null,

@@ -1,6 +1,6 @@
 // Frames in: decoded off the main thread, painted with the display's beat, acknowledged after that.
 
-import { isPainted } from "../document/picture-view.js";
+import { isPainted, isWide } from "../document/picture-view.js";
 
 export class Viewport {
   #context;
@@ -15,7 +15,8 @@ export class Viewport {
     this.canvas = canvas;
     this.painted = painted;
     this.names = names;
-    this.#context = canvas.getContext("2d", { willReadFrequently: true });
+    const colorSpace = isWide ? "display-p3" : "srgb";
+    this.#context = canvas.getContext("2d", { willReadFrequently: true, colorSpace });
     document.addEventListener("visibilitychange", this.#drop);
   }
 
@@ -98,12 +99,13 @@ export class Viewport {
   }
 
   pixels() {
-    return this.#context.getImageData(0, 0, this.canvas.width, this.canvas.height);
+    return this.#context.getImageData(0, 0, this.canvas.width, this.canvas.height, { colorSpace: "srgb" });
   }
 
-  // The displayed colour at a place, 0..255.
+  // The displayed colour at a place, in sRGB, 0..255.
   pixel({ x, y }) {
     const { width, height } = this.canvas;
-    return [...this.#context.getImageData(Math.floor(x * width), Math.floor(y * height), 1, 1).data];
+    const at = [Math.floor(x * width), Math.floor(y * height), 1, 1];
+    return [...this.#context.getImageData(...at, { colorSpace: "srgb" }).data];
   }
 }

@@ -13,9 +13,8 @@ from collections import OrderedDict
 
 import numpy as np
 
-from gpu import ViewTable
+from gpu import GpuError, ViewTable
 from service import displays
-from service.problems import Internal
 
 log = logging.getLogger(__name__)
 
@@ -59,5 +58,5 @@ def exact(colors: np.ndarray, display: str, view: str) -> np.ndarray:
         image, display, view, displays.SOURCE, unpremult=False, colorconfig=displays.CONFIGURATION, nthreads=1
     )
     if out.has_error:
-        raise Internal(f"OpenColorIO could not show {display}/{view}: {out.geterror()}")
+        raise GpuError(f"OpenColorIO could not show {display}/{view}: {out.geterror()}")
     return np.asarray(out.get_pixels(oiio.FLOAT))

@@ -43,6 +43,14 @@ def test_a_view_is_answered_when_done(client: Client, view: dict[str, Any], mime
     assert not client.silence(0.2)
 
 
+def test_frames_for_wide_screens_say_so(client: Client) -> None:
+    client.start(view={"format": "jpeg", "color_space": "display_p3"})
+    _, frame = client.finished()
+    assert "icc_profile" in Image.open(io.BytesIO(frame.image)).info
+    client.say("view", color_space="srgb")
+    assert "icc_profile" not in Image.open(io.BytesIO(client.frame().image)).info
+
+
 def test_a_view_keeps_what_it_does_not_name(client: Client) -> None:
     client.start(view={"format": "png"})
     client.finished()
