@@ -59,10 +59,13 @@ class TextureArrays:
     """
 
     slots: dict[str, int]
-    words: np.ndarray  # (materials, n) uint32: its `TextureSlot`s, then a `TextureUse` for each member
+    # (materials, n) uint32: its `TextureSlot`s, a `TextureUse` for each member, and where any slot has one a
+    # `TextureRecipe` for each, with room for this number of stops.
+    words: np.ndarray
     texels: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint8))  # of 8-bit images, in a row
     floats: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # of all others
     key: str = ""  # equal where the texels are
+    stops: int | None = None  # None: no slot has a recipe
 
 
 def _empty(record: type[Record]) -> np.ndarray:
@@ -106,6 +109,8 @@ class SceneArrays:
     node_scale: Vec3 = (0.0, 0.0, 0.0)
     instances: np.ndarray = field(default_factory=lambda: _empty(layout.Instance))
     instance_nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # of all trees
+    # Of all shapes, in the document's order, where a material reads a solid texture; else none.
+    spaces: np.ndarray = field(default_factory=lambda: _empty(layout.ShapeSpace))
     instance_shift: int = 0  # bits of the number of the most triangles that an instance has
     bvh_kinds: frozenset[ShapeKind] = frozenset()
     large: Mapping[ShapeKind, int] = field(default_factory=dict)
@@ -137,6 +142,7 @@ class MovedArrays(TypedDict, total=False):
     lights: np.ndarray
     light_tree: np.ndarray
     instances: np.ndarray
+    spaces: np.ndarray
     nodes: np.ndarray
     node_count: int
     node_origin: Vec3

@@ -76,9 +76,12 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
         textures[bindings.LIGHT_TREE_TEXTURE].release()
         textures[bindings.LIGHT_TREE_TEXTURE] = texture
         sent += new.light_words.nbytes
-    if old.instances is not new.instances and len(changed := np.flatnonzero(old.instances != new.instances)):
-        part = slice(int(changed[0]), int(changed[-1]) + 1)
-        sent += update_range(textures[bindings.INSTANCES_TEXTURE], new.instances, part)
+    for unit, was, is_ in (
+        (bindings.INSTANCES_TEXTURE, old.instances, new.instances),
+        (bindings.SPACES_TEXTURE, old.spaces, new.spaces),
+    ):
+        if was is not is_ and len(changed := np.flatnonzero(was != is_)):
+            sent += update_range(textures[unit], is_, slice(int(changed[0]), int(changed[-1]) + 1))
     return sent
 
 

@@ -20,13 +20,17 @@ KINDS = {  # channels and dtype, by texture unit
     bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
     bindings.INSTANCES_TEXTURE: (4, "u4"),
     bindings.MICROFACETS_TEXTURE: (4, "u4"),
+    bindings.SPACES_TEXTURE: (4, "u4"),
 }
 IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
 
 
 def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
     """The values behind each texture unit that kernels with these flags read, where the scene has any: the triangles'
-    corners, instances, parameters and tables of `microfacet`, the lights' tree, images. KINDS has their formats."""
+    corners, instances, spaces of shapes, parameters and tables of `microfacet`, the lights' tree, images.
+
+    KINDS has their formats.
+    """
     colors = arrays.corner_colors if "HAS_VERTEX_COLORS" in flags else arrays.triangle_colors
     values = {
         bindings.UVS_TEXTURES[0]: arrays.triangle_uvs,
@@ -34,6 +38,7 @@ def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.n
         bindings.COLORS_TEXTURE: colors,
         bindings.INSTANCES_TEXTURE: arrays.instances,
         bindings.MICROFACETS_TEXTURE: arrays.microfacets,
+        bindings.SPACES_TEXTURE: arrays.spaces,
     }
     if arrays.textures is not None:
         values[bindings.BYTES_TEXTURE] = arrays.textures.texels

@@ -4,6 +4,8 @@ flag_table      a row for each flag: what needs it, and which sliders raise it
 features        what kernels are compiled with: a scene's flags before and after edits, its numbers of records
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL
+recipes_glsl    how textures are computed, as GLSL
+words_glsl      records read from words, as GLSL
 instances_glsl  records of instances as GLSL
 microfacets_glsl  parameters and tables of the model `microfacet` as GLSL
 models_glsl     the functions that pick those of a material's model, as GLSL

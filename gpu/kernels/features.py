@@ -106,8 +106,7 @@ def counts(scene: SceneArrays) -> dict[str, object]:
     out: dict[str, object] = {name: looped_count(scene, kind) for name, kind in COUNTS.items()}
     out |= {_loop(name): n for name, n in out.items()}
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
-    slots = {} if scene.textures is None else scene.textures.slots
-    room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * textures_glsl.groups(slots))
+    room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * textures_glsl.groups(scene.textures))
     most = {"MATERIAL_COUNT": min(_FEW_MAX, room), "LIGHT_COUNT": _FEW_MAX}
     out |= {name: n if n <= most[name] else 0 for name, n in few.items()}
     return {**out, **textures_glsl.defines(scene.textures), "QUAD_LAMP": _quad_lamp(scene)}

@@ -222,6 +222,7 @@ def _of_textures(name: str, asks: Asks, previewed: Asks = Flag.previewed) -> Fla
     return Flag(name, asks, previewed=previewed, in_general=False)
 
 
+_NO_IMAGE = texture_records.SLOT_CHECKER | texture_records.SLOT_NOISE | texture_records.SLOT_COORDINATES
 _STRETCHED = with_optional("anisotropic")
 _ROWS = (
     Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
@@ -250,10 +251,13 @@ _ROWS = (
     Flag("HAS_HIDDEN_SHAPES", _hidden),
     Flag("HAS_OPACITY", lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s), compiled_with=ANYWHERE),
     _of_textures("HAS_TEXTURES", lambda s: s.textures is not None or len(s.triangle_colors) > 0),
-    _of_textures("HAS_BYTE_TEXELS", _slot(0, texture_records.SLOT_FLOATS | texture_records.SLOT_CHECKER)),
+    _of_textures("HAS_BYTE_TEXELS", _slot(0, texture_records.SLOT_FLOATS | _NO_IMAGE)),
     _of_textures("HAS_FLOAT_TEXELS", _slot(texture_records.SLOT_FLOATS, texture_records.SLOT_CHECKER)),
     _of_textures("HAS_SRGB_TEXELS", _slot(texture_records.SLOT_SRGB)),
     _of_textures("HAS_CHECKERS", _slot(texture_records.SLOT_CHECKER)),
+    _of_textures("HAS_NOISES", _slot(texture_records.SLOT_NOISE)),
+    _of_textures("HAS_SOLID_TEXTURES", _slot(texture_records.SLOT_SOLID)),
+    _of_textures("HAS_RAMPS", _slot(texture_records.SLOT_RAMP)),
     _of_textures("HAS_UVS", lambda s: len(s.triangle_uvs) > 0),
     _of_textures("HAS_UVS_1", lambda s: len(s.triangle_uvs_1) > 0),
     _of_textures("HAS_VERTEX_COLORS", lambda s: len(s.triangle_colors) > 0),

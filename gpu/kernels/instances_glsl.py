@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gpu import layout
-from gpu.kernels import textures_glsl
+from gpu.kernels.words_glsl import unpacked
 from gpu.layout import Instance, ShapeKind, bindings
 
 UNIFORMS = ("node_first", "instance_shift")  # the last members of `layout.Uniforms`, which only these kernels have
@@ -26,6 +26,6 @@ struct Instance {{ {members} }};
 layout(binding = {bindings.INSTANCES_TEXTURE}) uniform usampler2D instance_texels;
 Instance instance_load(uint i) {{
 {words}
-    return Instance({textures_glsl.unpacked(Instance, 4)});
+    return Instance({unpacked(Instance, 4)});
 }}
 #endif"""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from gpu import layout
 from gpu.kernels import instances_glsl, microfacets_glsl, models_glsl, textures_glsl
+from gpu.kernels.words_glsl import unpacked
 from gpu.layout import LightKind, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, Slot
 from gpu.layout.models import MODELS
@@ -75,7 +76,7 @@ def _load(name: str, record: type[Record], function: str, words: str) -> str:
     lines = [f"{record.__name__} {name}_{function}(uint i) {{"]
     for k in range(record.words // group):
         lines.append(f"    uvec{group} w{k} = {name}_{words}[i * {stride} + {k}u];")
-    lines.append(f"    return {record.__name__}({textures_glsl.unpacked(record, group)});\n}}")
+    lines.append(f"    return {record.__name__}({unpacked(record, group)});\n}}")
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpu.kernels import textures_glsl
+from gpu.kernels.words_glsl import unpacked
 from gpu.layout import bindings
 from gpu.layout.microfacet_records import TERMS, Microfacet
 from gpu.tables import microfacet
@@ -28,6 +28,6 @@ uvec4 microfacet_words(uint i) {{
 vec4 microfacet_texel(uint i) {{ return uintBitsToFloat(microfacet_words(i)); }}
 Microfacet microfacet_load(uint i) {{
 {words}
-    return Microfacet({textures_glsl.unpacked(Microfacet, 4)});
+    return Microfacet({unpacked(Microfacet, 4)});
 }}
 #endif"""

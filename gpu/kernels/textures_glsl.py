@@ -11,6 +11,8 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import TextureArrays
+from gpu.kernels import recipes_glsl
+from gpu.kernels.words_glsl import unpacked
 from gpu.layout import bindings, texture_records
 from gpu.layout.record import Record
 from gpu.layout.texture_records import TextureSlot, TextureUse
@@ -20,21 +22,12 @@ SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
 ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS)
 
 
-def unpacked(record: type[Record], group: int) -> str:
-    """The members of a record, taken from the words w0, w1, ... of `group` numbers each."""
-    values = []
-    for member, kind in record.members.items():
-        at = record.offsets[member]
-        swizzle = "xyzw"[at % group : at % group + kind.words]
-        word = f"w{at // group}.{swizzle}"
-        values.append(word if kind.base is np.uint32 else f"uintBitsToFloat({word})")
-    return ", ".join(values)
-
-
 def records(textures: TextureArrays) -> tuple[np.ndarray, np.ndarray]:
     """The slots (materials, k) and the uses (materials, members) of a scene's materials."""
     first = (max(textures.slots.values(), default=-1) + 1) * TextureSlot.words
-    slots, uses = np.ascontiguousarray(textures.words[:, :first]), np.ascontiguousarray(textures.words[:, first:])
+    last = first + len(textures.slots) * TextureUse.words
+    slots, uses = textures.words[:, :first], textures.words[:, first:last]
+    slots, uses = np.ascontiguousarray(slots), np.ascontiguousarray(uses)
     return slots.view(TextureSlot.dtype), uses.view(TextureUse.dtype)
 
 
@@ -47,9 +40,9 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     surface = [slot for name, slot in slots.items() if name not in texture_records.OTHER_RANGES]
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
-    out["MATERIAL_GROUPS"] = f"{BASE + groups(slots)}u"
+    out["MATERIAL_GROUPS"] = f"{BASE + groups(textures)}u"
     out["TEXTURE_OPACITY_IN_ALPHA"] = int(textures is not None and _opacity_is_in_alpha(textures))
-    return out
+    return out | recipes_glsl.defines(textures, BASE + count * SLOT_GROUPS + len(slots) * USE_GROUPS)
 
 
 def _opacity_is_in_alpha(textures: TextureArrays) -> bool:
@@ -60,9 +53,12 @@ def _opacity_is_in_alpha(textures: TextureArrays) -> bool:
     return bool(np.isin(channels, (texture_records.CHANNEL_NONE, texture_records.CHANNEL_R + 3)).all())
 
 
-def groups(slots: dict[str, int]) -> int:
+def groups(textures: TextureArrays | None) -> int:
     """The number of groups of four words that follow each material."""
-    return (max(slots.values(), default=-1) + 1) * SLOT_GROUPS + len(slots) * USE_GROUPS
+    if textures is None:
+        return 0
+    count = max(textures.slots.values(), default=-1) + 1
+    return count * (SLOT_GROUPS + recipes_glsl.groups(textures)) + len(textures.slots) * USE_GROUPS
 
 
 def _reader(record: type[Record], name: str, first: str, size: int) -> str:
@@ -147,4 +143,5 @@ void texture_members(uint i, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout M
 
 {others}
 #endif
+{recipes_glsl.text()}
 """

@@ -163,6 +163,17 @@ class Instance(Record):
     axis_z_z: f32
 
 
+class ShapeSpace(Record):
+    """The way from the world to a shape's own coordinates: object = rows world + move."""
+
+    row_x: vec3
+    move_x: f32
+    row_y: vec3
+    move_y: f32
+    row_z: vec3
+    move_z: f32
+
+
 class TriangleNormals(Record):
     slot = Slot.TRIANGLE_NORMALS
     n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)

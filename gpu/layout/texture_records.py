@@ -8,6 +8,12 @@ from __future__ import annotations
 from gpu.layout.record import Record, f32, u32, vec3, vec4
 
 SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
+# Of slots that have a recipe: noise, solid or not, with creases or not; coordinates as colours; and a ramp over these
+# or over an image or a checker. The number of the recipe, that of the slot, stands above them.
+SLOT_NOISE, SLOT_SOLID, SLOT_TURBULENCE, SLOT_COORDINATES = (1 << i for i in range(8, 12))
+SLOT_RAMP, SLOT_RAMP_CONSTANT, SLOT_RAMP_SMOOTH, SLOT_RAMP_REPEAT, SLOT_RAMP_MIRROR = (1 << i for i in range(12, 17))
+SLOT_NUMBER_SHIFT = 24
+SLOT_MADE = SLOT_NOISE | SLOT_COORDINATES | SLOT_RAMP  # a slot with one of these has a recipe
 CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a
 
 # The numbers of a material that a texture may give, with their ranges: those that a surface is made from, which are
@@ -40,7 +46,7 @@ class TextureSlot(Record):
     height: u32
     flags: u32  # SLOT_*
     turn: vec4  # 2 x 2, row by row
-    color_a: vec3  # of a checker
+    color_a: vec3  # of a checker or a noise
     offset_u: f32
     color_b: vec3
     offset_v: f32
@@ -51,3 +57,17 @@ class TextureUse(Record):
 
     factor: vec3  # of a normal map x is its strength
     channel: u32  # CHANNEL_*
+
+
+class TextureRecipe(Record):
+    """How a slot's texel is computed. The ramp's stops follow, four words each: position, colour."""
+
+    scale: vec3  # of a noise, cells a metre or a unit of u and v
+    octaves: u32
+    offset: vec3
+    seed: u32
+    lacunarity: f32
+    gain: f32
+    amplitude: f32  # factor on the sum of the octaves
+    ramp_offset: f32
+    ramp_reads: vec4  # factors on the channels that the ramp reads

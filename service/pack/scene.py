@@ -17,6 +17,7 @@ from service.pack.geometry.assemble import assemble
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
+from service.pack.geometry.spaces import shape_spaces
 from service.pack.geometry.warnings import odd_meshes
 from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
@@ -104,6 +105,7 @@ def pack(
         light_tree=picked.tree,
         environment=sky.arrays,
         textures=textures,
+        spaces=shape_spaces(scene, built.origin),
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
     odd = odd_meshes(built.meshes.odd, materials, emissive)

@@ -9,9 +9,10 @@ import numpy as np
 from gpu.layout import LightKind, ShapeKind, texture_records
 from service.pack.geometry.geometry import Geometry
 from service.pack.textures.images import PackedTexels
+from service.pack.textures.recipes import listed
 from service.pack.textures.uses import TextureReference
 from service.pack.textures.words import record_of, values_of
-from service.scene.texture import CheckerTexture
+from service.scene.texture import CheckerTexture, ImageTexture
 
 # Barycentric places at which a triangle's emission is evaluated: the middles of the 16 quarters of its quarters.
 _EDGE = np.arange(4)
@@ -32,10 +33,9 @@ def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
 
 
 def _pixels(use: TextureReference, texels: PackedTexels) -> np.ndarray:
-    """(height, width, channels): the pixels of an image, or the two fields of a checker."""
-    if isinstance(use.texture, CheckerTexture):
-        return np.array([[use.texture.a, use.texture.b]], np.float32)
-    return texels.places[use.key][1].pixels
+    """(height, width, channels): the pixels of an image, or the colours of a texture that is computed."""
+    colors = listed(use)
+    return texels.places[use.key][1].pixels if colors is None else colors
 
 
 def mean_emission(
@@ -74,7 +74,9 @@ def _triangles(
 ) -> None:
     """Write each emitting triangle's own mean, as most of a textured mesh may be dark."""
     mine = np.flatnonzero((built.lights["kind"] == LightKind.TRIANGLE) & (built.lights["material"] == use.material))
-    second = not isinstance(use.texture, CheckerTexture) and use.texture.uv == 1
+    if use.ramp is not None or not isinstance(use.texture, ImageTexture | CheckerTexture):
+        return  # they are alike all over, or vary with places that are not known here
+    second = isinstance(use.texture, ImageTexture) and use.texture.uv == 1
     uvs = built.triangle_uvs_1 if second else built.triangle_uvs
     if not len(mine) or len(uvs) != len(built.shapes[ShapeKind.TRIANGLE]):
         return
@@ -88,13 +90,14 @@ def _triangles(
 
 
 def nearest(use: TextureReference, texels: PackedTexels, uv: np.ndarray) -> np.ndarray:
-    """(n, channels): the texels nearest to (n, 2) coordinates."""
+    """(n, channels): the texels of an image or a checker nearest to (n, 2) coordinates."""
     record = record_of(use, texels)
     turn = record["turn"].astype(np.float64).reshape(2, 2)
     uv = uv @ turn.T + [float(record["offset_u"]), float(record["offset_v"])]
     if isinstance(use.texture, CheckerTexture):
         odd = np.floor(uv).sum(axis=1) % 2 != 0
         return np.where(odd[:, None], use.texture.b, use.texture.a).astype(np.float32)
+    assert isinstance(use.texture, ImageTexture)
     pixels = texels.places[use.key][1].pixels
     if use.texture.wrap == "repeat":
         uv = uv - np.floor(uv)

@@ -2,6 +2,7 @@
 
 document        the document, and how it is parsed
 camera, light, shape, environment, material, texture, transform   its parts
+procedural      textures that are computed: noise and ramps
 settings        the settings of a render
 named           what a person can give a name
 base            the base of all models: strict, with hints for editors
@@ -43,6 +44,7 @@ from service.scene.material import (
 )
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
+from service.scene.procedural import NoiseTexture, RampInput, RampStop, RampTexture
 from service.scene.saved_material import SavedMaterial, check_saved_material
 from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
@@ -73,10 +75,14 @@ __all__ = [
     "MatrixTransform",
     "MeshShape",
     "MetalRoughMaterial",
+    "NoiseTexture",
     "NormalTexture",
     "PointLight",
     "PrincipledMaterial",
     "QuadShape",
+    "RampInput",
+    "RampStop",
+    "RampTexture",
     "SavedMaterial",
     "ScalarTexture",
     "Scene",

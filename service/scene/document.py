@@ -143,6 +143,8 @@ def _dangling(document: Any) -> Iterator[FieldError]:
     if not isinstance(document, dict):
         return
     materials, shapes, textures = (document.get(key) for key in ("materials", "shapes", "textures"))
+    if isinstance(textures, dict):
+        yield from chained(textures)
     if isinstance(materials, dict):
         if isinstance(textures, dict) or "textures" not in document:
             yield from textureless(materials, textures or {})
@@ -169,3 +171,17 @@ def textureless(materials: dict[str, Any], textures: dict[str, Any]) -> Iterator
                     f"/materials/{escaped(key)}/{escaped(field)}/texture",
                     f"there is no texture named {name[:80]!r}; there are {among(textures)}",
                 )
+
+
+def chained(textures: dict[str, Any]) -> Iterator[FieldError]:
+    """Errors for raw ramps of textures that do not exist, or that are ramps themselves."""
+    for key, texture in textures.items():
+        given = texture.get("input") if isinstance(texture, dict) else None
+        name = given.get("texture") if isinstance(given, dict) else None
+        if not isinstance(name, str):
+            continue
+        pointer, other = f"/textures/{escaped(key)}/input/texture", textures.get(name)
+        if name not in textures:
+            yield FieldError(pointer, f"there is no texture named {name[:80]!r}; there are {among(textures)}")
+        elif isinstance(other, dict) and other.get("type") == "ramp":
+            yield FieldError(pointer, f"{name[:80]!r} is a ramp: the input may be an image, a checker or a noise")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import chain, islice
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
 from service.problems import FieldError, InvalidDocument
 from service.scene.base import MOST_MISTAKES, Model, hint
-from service.scene.document import Limits, textureless, too_many
+from service.scene.document import Limits, chained, textureless, too_many
 from service.scene.material import Material
 from service.scene.texture import Texture
 from service.scene.validation import validated, validated_entries
@@ -47,6 +47,6 @@ def check_saved_material(document: Any, limits: Limits | None = None) -> None:
     validated(_SET, {**document, "textures": {}} if isinstance(textures, dict) else document, "")
     _, errors = validated_entries(_TEXTURE, textures.items(), lambda name, texture: None)
     errors = [FieldError(f"/textures{error.pointer}", error.detail) for error in errors]
-    errors += islice(textureless(materials, textures), MOST_MISTAKES)
+    errors += islice(chain(chained(textures), textureless(materials, textures)), MOST_MISTAKES)
     if errors:
         raise InvalidDocument(errors[:MOST_MISTAKES])

@@ -19,9 +19,9 @@ from service.scene.numbers import (
     described,
     vector_schema,
 )
+from service.scene.procedural import Channel, NoiseTexture, RampTexture
 
 Vec2 = tuple[float, float]
-Channel = Literal["r", "g", "b", "a"]
 
 
 def _pair(value: Any) -> Vec2:
@@ -75,15 +75,18 @@ class CheckerTexture(Model):
     scale: Annotated[Pair, hint("Scale", "How many squares along u and v.", unit="", widget="number")] = (8.0, 8.0)
 
 
-def _kind(value: Any) -> str:
-    has_type = "type" in value if isinstance(value, dict) else isinstance(value, CheckerTexture)
-    return CHECKER_TAG if has_type else IMAGE_TAG
+def _kind(value: Any) -> Any:
+    return value.get("type", IMAGE_TAG) if isinstance(value, dict) else getattr(value, "type", IMAGE_TAG)
 
 
-IMAGE_TAG, CHECKER_TAG = "<image>", "<checker>"
+IMAGE_TAG = "<image>"
 
 Texture = Annotated[
-    Annotated[ImageTexture, Tag(IMAGE_TAG)] | Annotated[CheckerTexture, Tag(CHECKER_TAG)], Discriminator(_kind)
+    Annotated[ImageTexture, Tag(IMAGE_TAG)]
+    | Annotated[CheckerTexture, Tag("checker")]
+    | Annotated[NoiseTexture, Tag("noise")]
+    | Annotated[RampTexture, Tag("ramp")],
+    Discriminator(_kind),
 ]
 
 

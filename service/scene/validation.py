@@ -110,7 +110,8 @@ def _detail(entry: Any, place: ErrorLocation) -> str:
     if kind == "extra_forbidden" and place.holder is not None:
         return _unknown_field(str(place.steps[-1]), place.holder)
     if kind == "union_tag_invalid":
-        return f"is not known: {described(value.get('type'))}; known are {context['expected_tags']}"
+        known = [tag for tag in context["expected_tags"].split(", ") if "<" not in tag]  # those are forms without it
+        return f"is not known: {described(value.get('type'))}; known are {', '.join(known)}"
     if kind == "literal_error":
         return f"must be {context['expected']}, not {described(value)}"
     words = _WORDS.get(kind)
@@ -140,7 +141,10 @@ _WORDS: dict[str, Callable[[dict[str, Any], Any], str]] = {
     "bool_type": _not("true or false"),
     "string_type": _not("a text"),
     "string_too_short": lambda context, value: "must not be empty",
-    "too_short": lambda context, value: "must not be empty",
+    "too_short": lambda context, value: (
+        "must not be empty" if context["min_length"] == 1 else f"must have at least {context['min_length']} entries"
+    ),
+    "too_long": lambda context, value: f"must have at most {context['max_length']} entries",
     "list_type": _not("an array"),
     "dict_type": _not("an object"),
     "model_type": _not("an object"),

@@ -41,7 +41,7 @@ def _number(scene: Scene) -> int:
 
 def _asked(scene: Scene) -> list[object]:
     """The demands on textures and meshes that these could turn out not to meet."""
-    sets = [getattr(texture, "uv", 0) for texture in scene.textures.values()]
+    sets = [[getattr(t, name, None) for name in ("uv", "space", "input")] for t in scene.textures.values()]
     return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes]]
 
 

@@ -1,6 +1,8 @@
 // Textures and vertex colours, and the material that they make at a point. The texels of all images stand one after
 // another, row 0 first, in one texture for bytes and one for floats. They are filtered here: images of any number, size
 // and wrap cost no more than four fetches, and sRGB is decoded before it is filtered.
+#include "material/recipe.glsl"
+
 #if HAS_TEXTURES
 ivec2 texture_place(uint at) { return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW); }
 
@@ -56,7 +58,8 @@ void texture_axis(float x, uint n, uint flags, out int a, out int b, out float s
     if (b > last) b = stays ? last : 0;
 }
 
-vec4 texture_sample(TextureSlot s, SurfacePoint at) {
+// `made`: whether the slot has a recipe in some material.
+vec4 texture_sample(TextureSlot s, SurfacePoint at, bool made) {
     vec2 uv = at.uv;
 #if HAS_UVS_1
     if ((s.flags & TEXTURE_SLOT_UV_1) != 0u) uv = at.uv_1;
@@ -78,14 +81,20 @@ vec4 texture_sample(TextureSlot s, SurfacePoint at) {
     bool even = fract(0.5 * (cell.x + cell.y)) < 0.25;
     if ((s.flags & TEXTURE_SLOT_CHECKER) != 0u) c = vec4(even ? s.color_a : s.color_b, 1.0);
 #endif
+#if HAS_NOISES || HAS_RAMPS
+    if (made && (s.flags & TEXTURE_SLOT_MADE) != 0u) c = recipe_texel(s, at, uv, c);
+#endif
     return c;
 }
+
+vec4 texture_sample(TextureSlot s, SurfacePoint at) { return texture_sample(s, at, true); }
 
 // Samples all slots that a surface is made from.
 void texture_look(SurfacePoint at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     texels[0] = vec4(0.0);
     for (uint k = 0u; k < uint(TEXTURE_SURFACE_SLOTS); k++) {
-        texels[k] = texture_sample(texture_slot_pick(at.material, k), at);
+        bool made = ((TEXTURE_MADE_SLOTS >> k) & 1u) != 0u; // known to the compiler, as the loop unrolls
+        texels[k] = texture_sample(texture_slot_pick(at.material, k), at, made);
     }
 }
 

@@ -43,10 +43,13 @@ def made_of(material: Doc, *shapes: Doc, **more: Any) -> Doc:
 
 
 def textured(material: Doc, *shapes: Doc, **texture: Any) -> Doc:
-    return made_of({"type": "principled", **material}, *shapes, textures={"t": {"asset": "bytes", **texture}})
+    image = {} if "type" in texture else {"asset": "bytes"}
+    return made_of({"type": "principled", **material}, *shapes, textures={"t": {**image, **texture}})
 
 
 T = {"texture": "t"}
+NOISE = {"type": "noise", "scale": [0.8, 0.8, 0.8], "octaves": 2}
+RAMP = {"type": "ramp", "stops": [{"position": 0, "color": 0.2}, {"position": 1, "color": [0.9, 0.4, 0.1]}]}
 MICROFACET = {"type": "microfacet", "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}
 LAMP = {"type": "diffuse", "albedo": 0, "emission": 3}
 SCENES: dict[str, Doc] = {
@@ -62,6 +65,9 @@ SCENES: dict[str, Doc] = {
     "BYTE_TEXELS": textured({"roughness": T}), "FLOAT_TEXELS": textured({"base_color": T}, asset="floats"),
     "SRGB_TEXELS": textured({"base_color": T}),
     "CHECKERS": made_of({"type": "diffuse", "albedo": T}, textures={"t": {"type": "checker", "a": 0, "b": 1}}),
+    "NOISES": textured({"base_color": T}, **NOISE, space="uv"),
+    "SOLID_TEXTURES": textured({"base_color": T}, **NOISE),
+    "RAMPS": textured({"base_color": T}, **RAMP),
     "UVS": textured({"base_color": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}),
     "VERTEX_COLORS": lit({**TRIANGLE, "colors": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}),
     "NORMAL_MAPS": textured({"normal_map": T}, color_space="linear"),

@@ -401,6 +401,40 @@ class MicrofacetMaterial(TypedDict, total=False):
     """Bends the surface's normal without moving the surface."""
 
 
+class NoiseTexture(TypedDict, total=False):
+    """Gradient noise, in one octave or in several (fBm): a smooth pattern without a period that anybody would see.
+    With N the noise of one octave, which is 0 on average and lies in -1..1 (its standard deviation is about 0.25), n
+    is the sum of gain^i N_i over the octaves i, divided by the sum of gain^i; each octave is `lacunarity` times as
+    fine as the one before, turned, and has cells of its own. With `turbulence` N_i is its absolute value, so that n
+    lies in 0..1. The texture's colour is a + (b - a) t, where t = 1/2 + contrast n / 2 or, with turbulence, t =
+    contrast n, kept to 0..1. Its three channels are the colour's; it has no alpha."""
+
+    type: Required[Literal["noise"]]
+    a: list[float] | float | str
+    """The colour or value where the noise is lowest. (0 to 1e+20, default [0.0, 0.0, 0.0])"""
+    b: list[float] | float | str
+    """The colour or value where it is highest. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
+    space: Literal["object", "uv"]
+    """object: solid, in metres before the shape's transform; uv: along its texture coordinates. (default 'object')"""
+    scale: list[float]
+    """Cells of the first octave a metre along x, y and z, or along u and v; unequal numbers stretch the pattern.
+    (default [4.0, 4.0, 4.0])"""
+    offset: list[float]
+    """Added after the scale, in cells. (default [0.0, 0.0, 0.0])"""
+    octaves: int
+    """Each adds finer detail, and costs time. (1 to 10, default 4)"""
+    lacunarity: float
+    """How much finer each octave is than the one before. (1 to 4, default 2.0)"""
+    gain: float
+    """How much of the octave before each one adds: roughness of the detail. (0 to 1, default 0.5)"""
+    turbulence: bool
+    """On: creases where the noise changes sign. (default False)"""
+    contrast: float
+    """About the middle: at 1 noise hardly reaches its ends, at 2 a single octave does. (0 to 1000, default 2.0)"""
+    seed: int
+    """Another one is another pattern. (0 to 4.29497e+09, default 0)"""
+
+
 class PhongMaterial(TypedDict, total=False):
     """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
 
@@ -519,6 +553,47 @@ class QuadShape(TypedDict, total=False):
     """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
 
 
+class RampInput(TypedDict, total=False):
+    """Another texture, which must be no ramp itself. A byte of an image counts as byte / 255 unless its texture says
+    that it is sRGB."""
+
+    texture: Required[str]
+    """The name of one of the scene's textures."""
+    channel: Literal["r", "g", "b", "a"]
+    """Which of the texture's channels is read. (default 'r')"""
+
+
+class RampStop(TypedDict, total=False):
+    """A colour, and where the ramp has it."""
+
+    position: Required[float]
+    """Along the ramp. (0 to 1)"""
+    color: Required[list[float] | float | str]
+    """There, as a colour or a value. (0 to 1e+20)"""
+
+
+class RampTexture(TypedDict, total=False):
+    """Colours along a line, over a texture coordinate or over another texture.  With x the input, t = offset + scale
+    x is brought to 0..1 as `wrap` says: kept there; its fraction; or its fraction by turns forwards and backwards.
+    The stops count in the order of their positions, those of equal positions in the order in which they are given.
+    Before the first stop and after the last the colour stays; in between, `interpolation` says whether it goes on in
+    a straight line, keeps the colour of the stop before, or eases in and out (3 w^2 - 2 w^3)."""
+
+    type: Required[Literal["ramp"]]
+    input: Literal["u", "v"] | RampInput
+    """A texture coordinate, or another texture. (default 'u')"""
+    stops: Required[list[RampStop]]
+    """Where it has which colour."""
+    interpolation: Literal["linear", "constant", "smooth"]
+    """How a colour becomes the next one. (default 'linear')"""
+    scale: float
+    """Factor on the input: 2 runs through the ramp twice, where it repeats. (default 1.0)"""
+    offset: float
+    """Added after the scale. (default 0.0)"""
+    wrap: Literal["clamp", "repeat", "mirror"]
+    """What lies beyond the ramp's ends. (default 'clamp')"""
+
+
 class SkyEnvironment(TypedDict, total=False):
     """A clear sky by day: Hosek and Wilkie's model of dome and sun, above Lambertian ground."""
 
@@ -583,6 +658,9 @@ Environment = ConstantEnvironment | ImageEnvironment | CubemapEnvironment | SkyE
 Light = PointLight | SpotLight | DirectionalLight
 
 
+Texture = ImageTexture | CheckerTexture | NoiseTexture | RampTexture
+
+
 Material = (
     DiffuseMaterial
     | DisneyMaterial
@@ -608,7 +686,7 @@ class Scene(TypedDict, total=False):
     """What surrounds the scene; without one it is black."""
     lights: list[Light]
     """Lights that are no shapes."""
-    textures: dict[str, ImageTexture | CheckerTexture]
+    textures: dict[str, Texture]
     """By names of your choice."""
     materials: Required[dict[str, Material]]
     """By names of your choice."""

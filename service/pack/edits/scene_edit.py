@@ -63,5 +63,5 @@ def _same(a: Any, b: Any) -> bool:
         return all(_same(getattr(a, name), getattr(b, name)) for name in still)
     if isinstance(a, TextureArrays) and isinstance(b, TextureArrays):
         images = a.key == b.key != "" or (_same(a.texels, b.texels) and _same(a.floats, b.floats))
-        return a.slots == b.slots and a.words.shape == b.words.shape and images
+        return a.slots == b.slots and a.stops == b.stops and a.words.shape == b.words.shape and images
     return type(a) is type(b) and bool(a == b)

@@ -11,6 +11,7 @@ from service.pack.parameters import member_of
 from service.problems import FieldError, InvalidDocument, escaped
 from service.scene import Scene
 from service.scene.material import Material, MicrofacetMaterial, stretches
+from service.scene.procedural import NoiseTexture, RampInput, RampTexture
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
@@ -25,12 +26,18 @@ DECODED = " decoded"  # appended to the reference of an asset whose sRGB floats 
 
 @dataclass(frozen=True)
 class TextureReference:
-    """One reference of a material to a texture. `material` is an index; `pointer` is that of the reference."""
+    """One reference of a material to a texture. `material` is an index; `pointer` is that of the reference.
+
+    `texture` is the one that is read, by a `ramp` or as it is, and `name` its name; None where a ramp reads a
+    coordinate.
+    """
 
     material: int
     member: str
     reference: Reference
-    texture: ImageTexture | CheckerTexture
+    texture: ImageTexture | CheckerTexture | NoiseTexture | None
+    ramp: RampTexture | None
+    name: str
     srgb: bool  # bytes that the kernel decodes
     pointer: str
     bounds: tuple[float, float]  # that its values are clamped to
@@ -61,33 +68,51 @@ def required_charts(scene: Scene) -> dict[str, RequiredCharts]:
     out = {}
     for name, material in scene.materials.items():
         sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
-        found = RequiredCharts(frozenset(sets.values()), _tangent_set(material, sets))
+        flat = frozenset(which for which in sets.values() if which is not None)
+        found = RequiredCharts(flat, _tangent_set(material, sets))
         if found != RequiredCharts():
             out[name] = found
     return out
 
 
-def _uv_set(scene: Scene, reference: Reference) -> int:
-    texture = scene.textures[reference.texture]
+def _read(scene: Scene, name: str) -> tuple[str, ImageTexture | CheckerTexture | NoiseTexture | None]:
+    """The texture that is read in the end, and its name: that of a ramp's input. None for a coordinate."""
+    texture = scene.textures[name]
+    if not isinstance(texture, RampTexture):
+        return name, texture
+    if not isinstance(texture.input, RampInput):
+        return name, None
+    inner = scene.textures[texture.input.texture]
+    assert not isinstance(inner, RampTexture)  # refused with the document
+    return texture.input.texture, inner
+
+
+def _uv_set(scene: Scene, reference: Reference) -> int | None:
+    """The set of coordinates that a reference reads; None where it is solid."""
+    _, texture = _read(scene, reference.texture)
+    if isinstance(texture, NoiseTexture) and texture.space == "object":
+        return None
     return texture.uv if isinstance(texture, ImageTexture) else 0
 
 
-def _tangent_set(material: Material, sets: Mapping[str, int]) -> int | None:
+def _tangent_set(material: Material, sets: Mapping[str, int | None]) -> int | None:
     """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic."""
     for name in ("normal_map", "clearcoat_normal_map"):
         if name in sets:
-            return sets[name]
+            return sets[name] or 0
     return 0 if stretches(material) else None
 
 
 def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureReference]:
     for i, (name, material) in enumerate(scene.materials.items()):
         for key, reference in references(material).items():
-            texture = scene.textures[reference.texture]
+            whole = scene.textures[reference.texture]
+            ramp = whole if isinstance(whole, RampTexture) else None
+            read, texture = _read(scene, reference.texture)
             srgb = is_8bit = False
             if isinstance(texture, ImageTexture):
                 is_8bit = images[texture.asset].is_8bit
-                assumed = is_8bit and isinstance(reference, ColorTexture)
+                assumed = is_8bit and isinstance(reference, ColorTexture) and ramp is None
                 srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
             pointer = f"/materials/{escaped(name)}/{key}"
             member = member_of(material, key)
@@ -95,7 +120,8 @@ def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureRe
             if isinstance(material, MicrofacetMaterial) and key == "alpha":
                 bounds = material.alpha_range
             decoded = srgb and not is_8bit
-            yield TextureReference(i, member, reference, texture, srgb and is_8bit, pointer, bounds, decoded)
+            seen = texture, ramp, read
+            yield TextureReference(i, member, reference, *seen, srgb and is_8bit, pointer, bounds, decoded)
 
 
 def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]) -> None:
@@ -103,6 +129,12 @@ def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]
     for use in uses:
         name = use.reference.texture
         channels = images[use.texture.asset].pixels.shape[2] if isinstance(use.texture, ImageTexture) else 3
+        if use.ramp is not None:
+            given = use.ramp.input
+            if isinstance(given, RampInput) and given.channel == "a" and channels < 4:
+                detail = f"texture {given.texture!r} has no alpha"
+                errors.append(FieldError(f"/textures/{escaped(name)}/input/channel", detail))
+            channels = 3
         if isinstance(use.reference, NormalTexture):
             if channels < 3:
                 detail = f"a normal map has red, green and blue; {name!r} is grey"

@@ -13,10 +13,12 @@ from service.assets import Assets, ImageData
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.parameters import member_of
 from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
+from service.pack.textures.recipes import listed, recipe_flags, recipe_words, room_for_stops
 from service.pack.textures.uses import TextureReference, check_channels, uses_of
 from service.problems import escaped
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
+from service.scene.procedural import NoiseTexture
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
@@ -38,16 +40,17 @@ def pack_textures(
     uses = list(uses_of(scene, images))
     check_channels(uses, images)
     used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
-    wanted = {use.texture.asset: use.reference.texture for use in uses if isinstance(use.texture, ImageTexture)}
+    wanted = {use.texture.asset: use.name for use in uses if isinstance(use.texture, ImageTexture)}
     texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
     if not uses:
         return None, uses, texels, []
     slots = _slots(uses)
-    words = _words(len(scene.materials), uses, slots, texels)
+    stops = room_for_stops(uses)
+    words = _words(len(scene.materials), uses, slots, texels, stops)
     write_uses(words, scene, slots)
     key = " ".join(f"{kept}@{first}" for kept, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
-    arrays = TextureArrays(slots, words, texels.texels, texels.floats, key)
+    arrays = TextureArrays(slots, words, texels.texels, texels.floats, key, stops)
     return arrays, uses, texels, [*_image_warnings(wanted, images), *_warnings(uses, texels)]
 
 
@@ -73,28 +76,43 @@ def _slots(uses: list[TextureReference]) -> dict[str, int]:
     return slots
 
 
-def _words(materials: int, uses: list[TextureReference], slots: dict[str, int], texels: PackedTexels) -> np.ndarray:
-    """(materials, n) uint32: the slots filled in, the uses still empty."""
+def _words(
+    materials: int, uses: list[TextureReference], slots: dict[str, int], texels: PackedTexels, stops: int | None
+) -> np.ndarray:
+    """(materials, n) uint32: the slots and the recipes filled in, the uses still empty."""
     count = max(slots.values()) + 1
     records = np.zeros((materials, count), texture_records.TextureSlot.dtype)
+    recipe_size = 0 if stops is None else texture_records.TextureRecipe.words + 4 * stops
+    recipes = np.zeros((materials, count, recipe_size), np.uint32)
     for slot in range(count):
         mine = [use for use in uses if slots[use.member] == slot]
         for use in mine:
             records[use.material, slot] = record_of(use, texels)
+            if stops is not None:
+                records[use.material, slot]["flags"] |= recipe_flags(use, slot)
+                recipes[use.material, slot] = recipe_words(use, stops)
         # Kernels sample the slots that a material does not use as well: those point at some texels and raise no flag.
         without = [m for m in range(materials) if all(use.material != m for use in mine)]
         records[without, slot] = records[mine[0].material, slot]
-    slot_words = count * texture_records.TextureSlot.words
-    words = np.zeros((materials, slot_words + len(slots) * texture_records.TextureUse.words), np.uint32)
-    words[:, :slot_words] = records.view(np.uint32).reshape(materials, -1)
-    return words
+        recipes[without, slot] = recipes[mine[0].material, slot]
+    blank = np.zeros((materials, len(slots) * texture_records.TextureUse.words), np.uint32)
+    return np.concatenate(
+        [records.view(np.uint32).reshape(materials, -1), blank, recipes.reshape(materials, -1)], axis=1
+    )
 
 
 def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     record = np.zeros((), texture_records.TextureSlot.dtype)
     texture = use.texture
-    if isinstance(texture, CheckerTexture):
+    if not isinstance(texture, ImageTexture):
         record["width"] = record["height"] = 1
+        record["turn"] = (1, 0, 0, 1)
+    if texture is None:
+        return record
+    if isinstance(texture, NoiseTexture):
+        record["color_a"], record["color_b"] = texture.a, texture.b
+        return record
+    if isinstance(texture, CheckerTexture):
         record["flags"] = texture_records.SLOT_CHECKER
         record["turn"] = (texture.scale[0], 0, 0, texture.scale[1])
         record["color_a"], record["color_b"] = texture.a, texture.b
@@ -116,14 +134,15 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
     """Write factors and channels, which an edit of a material may change, into the uses of `words`."""
     first = (max(slots.values()) + 1) * texture_records.TextureSlot.words
-    records = words[:, first:].copy().view(texture_records.TextureUse.dtype)
+    last = first + len(slots) * texture_records.TextureUse.words
+    records = words[:, first:last].copy().view(texture_records.TextureUse.dtype)
     records[:] = 0
     places = {member: i for i, member in enumerate(slots)}
     for i, material in enumerate(scene.materials.values()):
         for key, reference in references(material).items():
             record = records[i, places[member_of(material, key)]]
             record["channel"], record["factor"] = _channel(reference), _factor(reference)
-    words[:, first:] = records.view(np.uint32)
+    words[:, first:last] = records.view(np.uint32)
 
 
 def _channel(reference: Reference) -> int:
@@ -174,9 +193,9 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
                 yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
             continue
         low, high = use.bounds
-        pixels: np.ndarray
-        if isinstance(use.texture, CheckerTexture):
-            pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
+        pixels = listed(use)
+        if pixels is not None:
+            pass
         elif texels.places[use.key][1].is_8bit:
             continue  # 0..1: times the factor it stays in the range by definition
         else:
