@@ -27,6 +27,7 @@ class Imported:
     importer: int = 0  # the IMPORTER that wrote it
     variants: list[str] = field(default_factory=list)  # of its materials, by name
     animations: list[dict[str, Any]] = field(default_factory=list)  # [{name, duration}], s
+    bounds: list[list[float]] | None = None  # of its triangles where they stand: least and greatest x, y, z, m
 
     def check(self, pose: Pose) -> None:
         """Raise NotFound where the file does not have what a pose names."""
@@ -95,5 +96,6 @@ def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
         raise AssetError(f"as a scene it has a mistake at {error.errors[0]}") from None
     animations = [asdict(each) for each in file.animations]
     return Imported(
-        document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER, file.variants, animations
-    )
+        document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER, file.variants, animations,
+        file.bounds,
+    )  # fmt: skip

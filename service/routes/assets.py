@@ -100,8 +100,9 @@ class PoseQuery(BaseModel):
 async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuery, Query()]) -> Response:
     """Its references are assets here. A glTF file's skins, morph targets and nodes are posed as an animation has them
     at a time; the answer to the file's upload lists its `variants` and `animations`. That answer has `warnings`,
-    `exposure` and `aspect_ratio`, too; here they are in headers: `Sunbox-Warnings` (as much of the list as has room,
-    as JSON), `Sunbox-Exposure` and `Sunbox-Aspect-Ratio`, each only where there is something to say."""
+    `exposure`, `aspect_ratio` and `bounds`, too; here they are in headers, as JSON: `Sunbox-Warnings` (as much of the
+    list as has room), `Sunbox-Exposure`, `Sunbox-Aspect-Ratio` and `Sunbox-Bounds`, each only where there is
+    something to say."""
 
     storage, owner, pose = app_state(request).storage, owner_of(request), query.pose()
 
@@ -113,9 +114,9 @@ async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuer
 
     imported, text = await storing(read, caller_of(request))
     headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
-    for name in ("exposure", "aspect_ratio"):
+    for name in ("exposure", "aspect_ratio", "bounds"):
         if (value := getattr(imported, name)) is not None:
-            headers[f"sunbox-{name.replace('_', '-')}"] = repr(value)
+            headers[f"sunbox-{name.replace('_', '-')}"] = json.dumps(value)
     return Response(text, media_type="application/json", headers=headers)
 
 

@@ -54,9 +54,16 @@ export const save = (kind, title, document, query = {}) =>
   ask("PUT", `${saved(kind, title)}?${new URLSearchParams({ title, ...query })}`, json(document));
 export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
-export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`)).blob();
+// As JSON it would be what the asset is.
+export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`, { headers: { accept: "*/*" } })).blob();
 export const fetchAssetMaterials = (id) => get(`assets/${id}/materials`);
 export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
+
+// A scene's file as `pose` {variant, animation, time} has it: {document, bounds}, its corners.
+export async function fetchPosedScene(id, pose, signal) {
+  const answer = await ask("GET", `assets/${id}/scene?${new URLSearchParams(pose)}`, { signal });
+  return { document: await answer.json(), bounds: JSON.parse(answer.headers.get("sunbox-bounds")) };
+}
 
 // A small picture of a scene, as a PNG.
 export const renderPicture = async (scene, settings, signal) =>

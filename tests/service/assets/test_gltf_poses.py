@@ -176,8 +176,10 @@ def test_over_rest(server: Server) -> None:
     url = f"/v1/assets/{info['id']}"
     assert http.get(url, headers={"accept": "application/json"}).json() == info
     assert http.get(url, headers={"accept": "application/json, */*"}).content == file.glb()
-    shape = http.get(f"{url}/scene?animation=move&time=0.5").json()["shapes"][0]
+    posed = http.get(f"{url}/scene?animation=move&time=0.5")
+    shape = posed.json()["shapes"][0]
     assert shape["transform"]["matrix"][3] == 1.5
+    assert json.loads(posed.headers["sunbox-bounds"]) == [[0.5, -1, 0], [2.5, 1, 0]]
     for query, status, pointer, told in (
         ("animation=walk", 404, "/animation", "it has 'move'"),
         ("variant=red", 404, "/variant", "the file has no variants"),
