@@ -11,6 +11,7 @@ layout(std430, binding = SLOT_FIRST_HITS) buffer hit_buffer { uvec4 hits[]; };
 #include "math/sampling.glsl"
 #include "shapes/shapes.glsl"
 #include "material/texture.glsl"
+#include "material/height.glsl"
 #include "camera/camera.glsl"
 #include "shapes/transparency.glsl"
 
@@ -38,6 +39,9 @@ void main() {
             vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
             texture_look(at, texels);
             Material m = texture_material(at, texels);
+#if HAS_HEIGHTS
+            height_normal(at, at.ns);
+#endif
 #if HAS_NORMAL_MAPS
             texture_normal(at, texels, at.ns);
 #endif

@@ -14,6 +14,7 @@ layout(std430, binding = SLOT_COUNTERS) buffer counter_buffer {
 #include "math/sampling.glsl"
 #include "shapes/shapes.glsl"
 #include "material/texture.glsl"
+#include "material/height.glsl"
 #include "camera/camera.glsl"
 #include "path/path.glsl"
 #include "camera/sample_plan.glsl"

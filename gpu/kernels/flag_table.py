@@ -149,7 +149,13 @@ def _slot(flag: int, kind: int = 0) -> Asks:
 
 
 def _normal_mapped(s: SceneArrays) -> bool:
-    return s.textures is not None and any(name in s.textures.slots for name in ("normal", "coat_normal"))
+    """Whether textures bend normals: normal maps or heights."""
+    bending = (*texture_records.NORMALS, texture_records.HEIGHT)
+    return s.textures is not None and any(name in s.textures.slots for name in bending)
+
+
+def _has_heights(s: SceneArrays) -> bool:
+    return s.textures is not None and texture_records.HEIGHT in s.textures.slots
 
 
 def _coat_apart(s: SceneArrays) -> bool:
@@ -262,6 +268,7 @@ _ROWS = (
     _of_textures("HAS_UVS_1", lambda s: len(s.triangle_uvs_1) > 0),
     _of_textures("HAS_VERTEX_COLORS", lambda s: len(s.triangle_colors) > 0),
     _of_textures("HAS_NORMAL_MAPS", _normal_mapped),
+    _of_textures("HAS_HEIGHTS", _has_heights),
     _of_textures("HAS_COAT_NORMALS", _coat_apart, previewed=_normal_mapped),
     _of_textures("HAS_TEXTURED_LIGHTS", _veiled, previewed=_where("HAS_TEXTURES")),
     Flag("HAS_EMISSION", lambda s: bool((s.materials["emission"] > 0).any()), previewed=_always),

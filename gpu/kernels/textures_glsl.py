@@ -19,7 +19,8 @@ from gpu.layout.texture_records import TextureSlot, TextureUse
 
 BASE = layout.Material.words // 4  # groups of four words of a material without textures
 SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
-ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS)
+ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS, texture_records.HEIGHT)
+APART = (*texture_records.OTHER_RANGES, texture_records.HEIGHT)  # not sampled with what a surface is made from
 
 
 def records(textures: TextureArrays) -> tuple[np.ndarray, np.ndarray]:
@@ -37,7 +38,7 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     count = max(slots.values(), default=-1) + 1
     out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
     out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
-    surface = [slot for name, slot in slots.items() if name not in texture_records.OTHER_RANGES]
+    surface = [slot for name, slot in slots.items() if name not in APART]
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(textures)}u"

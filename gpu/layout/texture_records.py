@@ -34,6 +34,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     "alpha": LARGE,  # what the distribution allows comes later, in bsdf/models/microfacet.glsl
 }  # fmt: skip
 NORMALS = ("normal", "coat_normal")
+HEIGHT = "height"  # whose slopes bend both normals; sampled around a point, and not together with the others
 OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}
 TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
 
@@ -55,7 +56,7 @@ class TextureSlot(Record):
 class TextureUse(Record):
     """How a texel becomes a member of a material: that channel (or all three), times the factor."""
 
-    factor: vec3  # of a normal map x is its strength
+    factor: vec3  # of a normal map x is its strength, of a height metres
     channel: u32  # CHANNEL_*
 
 

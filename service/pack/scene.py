@@ -26,6 +26,7 @@ from service.pack.lights.light_bounds import Grown, grow_light_tree
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textured_emission import dark, mean_emission
+from service.pack.textures.heights import height_fields
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
 from service.problems import AssetError
@@ -199,7 +200,7 @@ def _geometry(
     used = {shape.material for shape in scene.shapes}
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
-    materials = ShapeMaterials(names, shining, required_charts(scene))
+    materials = ShapeMaterials(names, shining, required_charts(scene), height_fields(scene, assets))
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
         return assemble(scene.shapes, materials, assets, room)
     contents = tuple(map(content, scene.shapes))

@@ -12,11 +12,12 @@ from pydantic import Field, TypeAdapter
 from service.ipc.messages import BsdfQuestion
 from service.pack.parameters import has_terms
 from service.problems import FieldError, InvalidDocument, TooLarge
-from service.scene import ColorTexture, Material, NormalTexture, ScalarTexture, load_json
+from service.scene import Material, load_json
 from service.scene.base import Model
 from service.scene.material import MODELS
 from service.scene.number_arrays import QuestionDirections
 from service.scene.numbers import Cosine
+from service.scene.texture import references
 from service.scene.validation import validated
 
 MOST_PAIRS = 1 << 16  # of one question
@@ -136,8 +137,6 @@ def parse_material(document: Any) -> Material:
 
 
 def _without_textures(material: Material, pointer: str = "/material") -> None:
-    names = type(material).model_fields
-    textured = [n for n in names if isinstance(getattr(material, n), ScalarTexture | ColorTexture | NormalTexture)]
-    if textured:
+    if textured := references(material):
         detail = "a texture has no value without a surface: give a number or a colour"
         raise InvalidDocument(FieldError(f"{pointer}/{name}", detail) for name in textured)

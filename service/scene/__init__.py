@@ -50,7 +50,15 @@ from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
 from service.scene.shape import BoxShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 from service.scene.text import load_json
-from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, ScalarTexture, Texture
+from service.scene.texture import (
+    CheckerTexture,
+    ColorTexture,
+    HeightTexture,
+    ImageTexture,
+    NormalTexture,
+    ScalarTexture,
+    Texture,
+)
 from service.scene.transform import MatrixTransform, Transform
 
 __all__ = [
@@ -67,6 +75,7 @@ __all__ = [
     "DiskShape",
     "DisneyMaterial",
     "Environment",
+    "HeightTexture",
     "ImageEnvironment",
     "ImageTexture",
     "Light",

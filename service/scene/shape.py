@@ -137,6 +137,21 @@ class MeshShape(_Placed):
         hint("Smooth", "On: vertex normals; off: facets; neither: as the file says, which for STL is facets."),
     ] = None
     double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")] = True
+    displacement: Annotated[
+        bool, hint("Displacement", "On: the material's height moves the surface, in triangles of at most that edge.")
+    ] = False
+    max_edge: Annotated[
+        PositiveLength | None,
+        OMITTABLE,
+        hint(
+            "Longest edge",
+            "Of the triangles of a displaced mesh: shorter edges show finer relief and take more memory.",
+            unit="m",
+            widget="slider",
+            soft=0.1,
+            absent="1/200 of its size",
+        ),
+    ] = None
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:

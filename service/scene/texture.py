@@ -10,6 +10,7 @@ from service.scene.base import OMITTABLE, Model, hint, refusal
 from service.scene.color import Factors, Radiometric, Reflectance
 from service.scene.numbers import (
     LARGEST,
+    Coordinate,
     Degrees,
     Factor,
     Fraction,
@@ -123,6 +124,24 @@ class NormalTexture(_Reference):
     ] = 1.0  # fmt: skip
 
 
+class HeightTexture(_Reference):
+    """Heights above the surface, in metres along its normal: the scale times the texture minus the midlevel."""
+
+    channel: Annotated[Channel, hint("Channel", "Which of the texture's channels is read.")] = "r"
+    scale: Annotated[
+        Coordinate, hint("Scale", "How far white lies above black; below 0 white is deep.",
+                         unit="m", widget="slider", soft=(0, 0.1))
+    ] = 0.02  # fmt: skip
+    midlevel: Annotated[
+        Coordinate, hint("Midlevel", "The value of the texture that lies where the surface is.",
+                         unit="", widget="slider", soft=(0, 1))
+    ] = 0.5  # fmt: skip
+    shading: Annotated[
+        bool, hint("In the shading", "Off: only shapes with displacement show it, as where a normal map shows the "
+                                     "same relief.")
+    ] = True  # fmt: skip
+
+
 VALUE_TAG, REFERENCE_TAG = "<value>", "<reference>"
 
 
@@ -152,7 +171,7 @@ AnyRadiometric = Annotated[
     Annotated[Radiometric, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 
-Reference = ScalarTexture | ColorTexture | NormalTexture
+Reference = ScalarTexture | ColorTexture | NormalTexture | HeightTexture
 
 
 def references(material: Model) -> dict[str, Reference]:

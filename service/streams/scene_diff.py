@@ -50,13 +50,17 @@ def _skeleton(scene: Scene) -> tuple[object, ...]:
 
     Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
     which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents. An ambient
-    term counts where it is blinding.
+    term counts where it is blinding. Heights that move a mesh decide where its triangles are.
     """
+    displaced = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape) and shape.displacement}
     on_meshes = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape)}
     materials = [
-        (name, m.type, m.emission, m.emission_sides, _blinding(m), _looks(m), name in on_meshes and stretches(m))
+        (
+            name, m.type, m.emission, m.emission_sides, _blinding(m), _looks(m), name in on_meshes and stretches(m),
+            m.height if name in displaced else None,
+        )
         for name, m in scene.materials.items()
-    ]
+    ]  # fmt: skip
     return materials, scene.textures, scene.shapes, scene.lights, _environment(scene)
 
 
@@ -68,7 +72,10 @@ def _blinding(material: Material) -> float:
 
 
 def _looks(material: Material) -> list[object]:
-    return [(field, r.texture, getattr(r, "channel", None)) for field, r in references(material).items()]
+    return [
+        (field, r.texture, getattr(r, "channel", None), getattr(r, "shading", None))
+        for field, r in references(material).items()
+    ]
 
 
 def _environment(scene: Scene) -> object:

@@ -6,7 +6,7 @@ struct Interaction {
     vec3 facing;   // the normal that decides on which side of the surface a direction is
     Basis basis;   // the shading frame
     vec2 tangent;  // the direction in it that anisotropy stretches along
-    bool mapped;   // a normal map bends the normal of the base or of the coat
+    bool mapped;   // a texture bends the normal of the base or of the coat
     vec3 coat;     // the coat's own normal, as the viewer sees it; only with HAS_COAT_NORMALS
     bool transmits;
     Medium beyond; // the medium on the other side
@@ -56,9 +56,12 @@ Interaction interaction_make(inout Path path, out Material m) {
 #else
     m = material_pick(path.at.material);
 #endif
+#if HAS_HEIGHTS
+    here.mapped = height_normal(path.at, path.at.ns); // that of the surface on which coat and base lie
+#endif
 #if HAS_COAT_NORMALS
     SurfacePoint coat_at = path.at;
-    here.mapped = texture_coat_normal(path.at, texels, coat_at.ns);
+    here.mapped = texture_coat_normal(path.at, texels, coat_at.ns) || here.mapped;
     here.coat = sides_normal(coat_at, wo_w);
 #endif
 #if HAS_NORMAL_MAPS

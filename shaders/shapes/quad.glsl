@@ -37,5 +37,9 @@ SurfacePoint quad_point(Quad q, vec3 p, uint id) {
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
 #endif
+#if HAS_HEIGHTS
+    r.chart = mat2x3(q.u, q.v);
+    r.chart_1 = mat2x3(0.0);
+#endif
     return r;
 }

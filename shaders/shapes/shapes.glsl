@@ -20,6 +20,10 @@ struct SurfacePoint {
     vec2 uv_1;    // the second set of a mesh
     vec4 color;   // the vertex colour of a mesh
 #endif
+#if HAS_HEIGHTS
+    mat2x3 chart; // dp/du and dp/dv; 0: the surface has no such coordinates
+    mat2x3 chart_1;
+#endif
 };
 
 #include "math/basis.glsl"
@@ -96,7 +100,10 @@ bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
 
 // The point of a ray that hits nothing.
 SurfacePoint shapes_none(vec3 p, vec3 n) {
-#if HAS_TEXTURES
+#if HAS_HEIGHTS
+    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
+                        vec4(1.0), mat2x3(0.0), mat2x3(0.0));
+#elif HAS_TEXTURES
     return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
                         vec4(1.0));
 #elif HAS_ANISOTROPIC

@@ -34,6 +34,9 @@ SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
 #endif
+#if HAS_HEIGHTS
+    r.chart = r.chart_1 = mat2x3(0.0);
+#endif
     return r;
 }
 
@@ -59,6 +62,9 @@ SurfacePoint ellipsoid_point(Solid s, vec3 p) {
 #endif
 #if HAS_TEXTURES
     r.uv = sphere_uv(q);
+#endif
+#if HAS_HEIGHTS
+    r.chart = solid_axes(s) * sphere_chart(q);
 #endif
     return r;
 }
@@ -94,6 +100,9 @@ SurfacePoint box_point(Solid s, vec3 p) {
     // v grows with +y; on the top along -z, on the bottom along +z.
     vec3 b = n.y != 0.0 ? vec3(0.0, 0.0, -n.y) : vec3(0.0, 1.0, 0.0);
     r.uv = clamp(0.5 + 0.5 * vec2(dot(q, t), dot(q, b)), 0.0, 1.0);
+#endif
+#if HAS_HEIGHTS
+    r.chart = solid_axes(s) * mat2x3(2.0 * t, 2.0 * b);
 #endif
     return r;
 }

@@ -34,6 +34,15 @@ vec2 sphere_uv(vec3 n) {
 }
 #endif
 
+#if HAS_HEIGHTS
+// Its derivatives: how a place on the unit sphere moves with u and with v.
+mat2x3 sphere_chart(vec3 n) {
+    float side = length(n.xz);
+    vec2 out_xz = side > 0.0 ? n.xz / side : vec2(0.0, 1.0);
+    return mat2x3(TWO_PI * vec3(n.z, 0.0, -n.x), PI * vec3(-n.y * out_xz.x, side, -n.y * out_xz.y));
+}
+#endif
+
 SurfacePoint sphere_point(Sphere s, vec3 p) {
     SurfacePoint r;
     r.ng = normalize(p - s.center);
@@ -63,6 +72,11 @@ SurfacePoint sphere_point(Sphere s, vec3 p) {
     r.uv = sphere_uv(n);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
+#endif
+#if HAS_HEIGHTS
+    mat2x3 chart = sphere_chart(n);
+    r.chart = s.radius * mat2x3(basis_rotate(s.rotation, chart[0]), basis_rotate(s.rotation, chart[1]));
+    r.chart_1 = mat2x3(0.0);
 #endif
     return r;
 }

@@ -91,6 +91,29 @@ void triangle_detail(uint index, vec3 b, inout SurfacePoint r) {
 }
 #endif
 
+#if HAS_HEIGHTS
+// How the point moves with texture coordinates that grow by d1 and d2 along the edges e1 and e2.
+mat2x3 triangle_chart_of(vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
+    float area = d1.x * d2.y - d1.y * d2.x;
+    mat2x3 chart = mat2x3(d2.y * e1 - d1.y * e2, d1.x * e2 - d2.x * e1);
+    return area != 0.0 ? chart / area : mat2x3(0.0);
+}
+
+void triangle_chart(uint index, vec3 e1, vec3 e2, inout SurfacePoint r) {
+    r.chart = r.chart_1 = mat2x3(0.0);
+    ivec2 a = triangle_corner(index, 0u), b = triangle_corner(index, 1u), c = triangle_corner(index, 2u);
+#if HAS_UVS
+    vec2 uv = texelFetch(triangle_uvs, a, 0).xy;
+    r.chart = triangle_chart_of(e1, e2, texelFetch(triangle_uvs, b, 0).xy - uv, texelFetch(triangle_uvs, c, 0).xy - uv);
+#endif
+#if HAS_UVS_1
+    vec2 uv_1 = texelFetch(triangle_uvs_1, a, 0).xy;
+    r.chart_1 = triangle_chart_of(e1, e2, texelFetch(triangle_uvs_1, b, 0).xy - uv_1,
+                                  texelFetch(triangle_uvs_1, c, 0).xy - uv_1);
+#endif
+}
+#endif
+
 #if HAS_TANGENTS
 // The tangent of the k-th corner, whose normal has these bits. It is coded as an angle in that normal's plane, from the
 // x of the frame of [Duff et al. 2017]. The bits decide on the frame's sign, as they are the same on every device.
@@ -142,6 +165,9 @@ SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
 #endif
 #if HAS_TEXTURES
     triangle_detail(index, vec3(b0, uv), r);
+#endif
+#if HAS_HEIGHTS
+    triangle_chart(index, e1, e2, r);
 #endif
 #if HAS_SMOOTH_NORMALS
     TriangleNormals n = triangle_normals_load(index);

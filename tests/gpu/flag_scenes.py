@@ -71,6 +71,7 @@ SCENES: dict[str, Doc] = {
     "UVS": textured({"base_color": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}),
     "VERTEX_COLORS": lit({**TRIANGLE, "colors": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}),
     "NORMAL_MAPS": textured({"normal_map": T}, color_space="linear"),
+    "HEIGHTS": textured({"height": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}, ball("m"), FLOOR),
     "COAT_NORMALS": textured({"clearcoat": 1, "clearcoat_normal_map": T}, color_space="linear"),
     "EMISSION": made_of(LAMP), "EMISSION_BOTH": made_of({**LAMP, "emission_sides": "both"}),
     "SPHERE_LIGHTS": made_of(LAMP, ball("m")), "QUAD_LIGHTS": made_of(LAMP, FLOOR),

@@ -22,6 +22,21 @@ class ColorTexture(TypedDict, total=False):
     """The name of one of the scene's textures."""
 
 
+class HeightTexture(TypedDict, total=False):
+    """Heights above the surface, in metres along its normal: the scale times the texture minus the midlevel."""
+
+    channel: Literal["r", "g", "b", "a"]
+    """Which of the texture's channels is read. (default 'r')"""
+    scale: float
+    """How far white lies above black; below 0 white is deep. (m, default 0.02)"""
+    midlevel: float
+    """The value of the texture that lies where the surface is. (default 0.5)"""
+    shading: bool
+    """Off: only shapes with displacement show it, as where a normal map shows the same relief. (default True)"""
+    texture: Required[str]
+    """The name of one of the scene's textures."""
+
+
 class NormalTexture(TypedDict, total=False):
     """A normal map: red along growing u, green along growing v, blue outwards."""
 
@@ -66,6 +81,8 @@ class BlinnPhongMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class MatrixTransform(TypedDict, total=False):
@@ -198,6 +215,8 @@ class DiffuseMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class DirectionalLight(TypedDict, total=False):
@@ -272,6 +291,8 @@ class DisneyMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class ImageEnvironment(TypedDict, total=False):
@@ -330,6 +351,10 @@ class MeshShape(TypedDict, total=False):
     """On: vertex normals; off: facets; neither: as the file says, which for STL is facets."""
     double_sided: bool
     """Off: from behind it is not there, for any ray. (default True)"""
+    displacement: bool
+    """On: the material's height moves the surface, in triangles of at most that edge. (default False)"""
+    max_edge: float
+    """Of the triangles of a displaced mesh: shorter edges show finer relief and take more memory. (m, 0 to 1e+09)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
@@ -361,6 +386,8 @@ class MetalRoughMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class MicrofacetMaterial(TypedDict, total=False):
@@ -399,6 +426,8 @@ class MicrofacetMaterial(TypedDict, total=False):
     """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class NoiseTexture(TypedDict, total=False):
@@ -459,6 +488,8 @@ class PhongMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class PointLight(TypedDict, total=False):
@@ -531,6 +562,8 @@ class PrincipledMaterial(TypedDict, total=False):
     """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
     normal_map: NormalTexture
     """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
 class QuadShape(TypedDict, total=False):

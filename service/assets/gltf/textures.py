@@ -94,9 +94,7 @@ class Textures:
         other = texture.object("extensions")
         names = sorted(other.value) if other else []
         which = f" ({', '.join(names)[:80]})" if names else ""
-        self.notes.add(
-            texture.pointer, f"the texture has no image in PNG, JPEG, WebP or KTX2{which} and is left out"
-        )
+        self.notes.add(texture.pointer, f"the texture has no image in PNG, JPEG, WebP or KTX2{which} and is left out")
         return None
 
     def image(self, texture: JsonView) -> str | None:

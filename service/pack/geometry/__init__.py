@@ -6,6 +6,8 @@ reuse             reuse of the parts of earlier geometries
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
 meshes            meshes in world space, and their triangles as records
+displacement      meshes that a height moves
+subdivision       triangles cut until their edges are short enough
 vertex_normals    smooth normals at the corners, and their codes
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own

@@ -36,6 +36,7 @@ class MeshRequest:
     used: tuple[int, int]  # material, shape
     read: RequiredCharts  # by its material
     shines: bool
+    is_displaced: bool = False  # `data` has moved already, and has the normals to show
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,9 @@ def keys(wanted: Sequence[MeshRequest], apart: bool = False) -> list[Hashable | 
     shape shares them or sharing saves too little. With `apart` all meshes that are large enough are instances.
     """
     digests = dict[int, Hashable]()
-    sized = [None if each.shines or len(each.data.faces) < LEAST else _size(each) for each in wanted]
+    sized = [
+        None if each.shines or each.is_displaced or len(each.data.faces) < LEAST else _size(each) for each in wanted
+    ]
     many = Counter(sized)
     found: list[Hashable | None] = [
         None if size is None or (many[size] < 2 and not apart) else (*size, _content(each, digests))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from service.assets import Assets, MeshData, MeshOddities
 from service.assets.readers.mesh_checks import mesh_oddities
 from service.pack.geometry import instances, meshes
 from service.pack.geometry.analytic import AnalyticShapes, check_reach
+from service.pack.geometry.displacement import Displacement, displaced
 from service.pack.geometry.instances import Instance, MeshRequest
 from service.pack.geometry.meshes import Chart, PlacedMesh
 from service.pack.geometry.shared_meshes import SharedMesh, blank, shared_mesh
 from service.pack.geometry.warnings import OddMesh
+from service.pack.textures.heights import HeightField
 from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
@@ -29,6 +31,7 @@ class ShapeMaterials:
     names: Sequence[str]  # in order
     emissive: Collection[str] = frozenset()  # those that shine
     charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # the charts that they need of shapes
+    heights: Mapping[str, HeightField] = field(default_factory=dict)  # those that move meshes
 
 
 @dataclass
@@ -68,7 +71,11 @@ def place(
             if data.oddities != MeshOddities():
                 is_smoothed = data.normals is None and bool(np.any(_smooth(shape, data)))
                 out.odd.append(OddMesh(i, used[0], data.oddities, is_smoothed, shape.double_sided))
-            wanted.append(MeshRequest(shape, data, matrix, used, read, shape.material in materials.emissive))
+            request = MeshRequest(shape, data, matrix, used, read, shape.material in materials.emissive)
+            if shape.displacement:
+                made = sum(len(other.data.faces) for other in wanted if other.is_displaced)
+                request = _displaced(request, materials, max_triangles - made, out)
+            wanted.append(request)
     shown, room = _instances(wanted, known or {}, apart, max_triangles)
     for each, instance in zip(wanted, shown, strict=True):
         if instance is not None:
@@ -134,12 +141,26 @@ def _matrix(shape: Shape) -> np.ndarray | None:
 
 def _mesh(each: MeshRequest, matrix: np.ndarray | None) -> PlacedMesh:
     data, shape, read = each.data, each.shape, each.read
+    smooth = each.is_displaced or _smooth(shape, data)
     return meshes.place(
-        data.vertices, data.faces, data.normals, _smooth(shape, data), matrix, not shape.double_sided, each.used,
+        data.vertices, data.faces, data.normals, smooth, matrix, not shape.double_sided, each.used,
         data.uvs if read.uv_sets else None, data.uvs_1 if 1 in read.uv_sets else None,
         None if data.colors is None or (data.colors == 1).all() else data.colors,
         None if read.tangents is None else Chart(data.uvs_1 if read.tangents else data.uvs, data.tangents),
     )  # fmt: skip
+
+
+def _displaced(each: MeshRequest, materials: ShapeMaterials, room: int, out: World) -> MeshRequest:
+    """The mesh as its material's height moves it. Raises InvalidDocument."""
+    field = materials.heights.get(each.shape.material)
+    if field is None:
+        detail = f"displacement: material {each.shape.material[:80]!r} has no height, so nothing is displaced"
+        out.mesh_warnings.append((each.used[1], detail))
+        return each
+    _check_room(each, room)
+    axes = np.eye(3) if each.matrix is None else each.matrix[:3, :3]
+    by = Displacement(field, each.shape.max_edge, axes, each.used[1])
+    return replace(each, data=displaced(each.data, _smooth(each.shape, each.data), by, room), is_displaced=True)
 
 
 def _smooth(shape: MeshShape, data: MeshData) -> np.ndarray | bool:
@@ -156,7 +177,8 @@ def _model(key: Hashable, each: MeshRequest) -> SharedMesh | None:
 
 def _check_room(each: MeshRequest, room: int) -> None:
     if len(each.data.faces) > room:
-        detail = f"has {len(each.data.faces)} triangles; this server has room for {room} more in a scene"
+        room_left = f"this server has room for {room} more in a scene (SUNBOX_MAX_TRIANGLES)"
+        detail = f"has {len(each.data.faces)} triangles; {room_left}"
         raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", detail)])
 
 

@@ -12,12 +12,15 @@ from service.problems import FieldError, InvalidDocument, escaped
 from service.scene import Scene
 from service.scene.material import Material, MicrofacetMaterial, stretches
 from service.scene.procedural import NoiseTexture, RampInput, RampTexture
+from service.scene.shape import MeshShape
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
+    HeightTexture,
     ImageTexture,
     NormalTexture,
     Reference,
+    Texture,
     references,
 )
 
@@ -61,15 +64,21 @@ class RequiredCharts:
 
     uv_sets: frozenset[int] = frozenset()
     tangents: int | None = None  # None: it needs none
+    height: tuple[HeightTexture, Texture] | None = None  # that moves meshes of the material
 
 
 def required_charts(scene: Scene) -> dict[str, RequiredCharts]:
     """The charts of the materials that read any."""
+    displaced = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape) and shape.displacement}
     out = {}
     for name, material in scene.materials.items():
-        sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
+        sets = {key: _uv_set(scene, reference) for key, reference in sampled(material).items()}
+        tangents, height = _tangent_set(material, sets), None
+        if name in displaced and material.height is not None:
+            sets["height"] = _uv_set(scene, material.height)
+            height = material.height, scene.textures[material.height.texture]
         flat = frozenset(which for which in sets.values() if which is not None)
-        found = RequiredCharts(flat, _tangent_set(material, sets))
+        found = RequiredCharts(flat, tangents, height)
         if found != RequiredCharts():
             out[name] = found
     return out
@@ -103,9 +112,18 @@ def _tangent_set(material: Material, sets: Mapping[str, int | None]) -> int | No
     return 0 if stretches(material) else None
 
 
+def sampled(material: Material) -> dict[str, Reference]:
+    """The references that kernels read: all but a height that does not show in the shading."""
+    found = references(material)
+    height = found.get("height")
+    if isinstance(height, HeightTexture) and not height.shading:
+        del found["height"]
+    return found
+
+
 def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureReference]:
     for i, (name, material) in enumerate(scene.materials.items()):
-        for key, reference in references(material).items():
+        for key, reference in sampled(material).items():
             whole = scene.textures[reference.texture]
             ramp = whole if isinstance(whole, RampTexture) else None
             read, texture = _read(scene, reference.texture)

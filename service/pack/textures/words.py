@@ -14,7 +14,7 @@ from service.pack.edits.cache import PackCache, lasting
 from service.pack.parameters import member_of
 from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
 from service.pack.textures.recipes import listed, recipe_flags, recipe_words, room_for_stops
-from service.pack.textures.uses import TextureReference, check_channels, uses_of
+from service.pack.textures.uses import TextureReference, check_channels, sampled, uses_of
 from service.problems import escaped
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
@@ -22,11 +22,11 @@ from service.scene.procedural import NoiseTexture
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
+    HeightTexture,
     ImageTexture,
     NormalTexture,
     Reference,
     ScalarTexture,
-    references,
 )
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
@@ -69,7 +69,7 @@ def _slots(uses: list[TextureReference]) -> dict[str, int]:
         if slots[name] == len(by_slot):
             by_slot.append({})
         by_slot[slots[name]] |= mine
-    for name in texture_records.OTHER_RANGES:
+    for name in (*texture_records.OTHER_RANGES, texture_records.HEIGHT):
         if name in looks:
             slots[name] = len(by_slot)
             by_slot.append(looks[name])
@@ -139,7 +139,7 @@ def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
     records[:] = 0
     places = {member: i for i, member in enumerate(slots)}
     for i, material in enumerate(scene.materials.values()):
-        for key, reference in references(material).items():
+        for key, reference in sampled(material).items():
             record = records[i, places[member_of(material, key)]]
             record["channel"], record["factor"] = _channel(reference), _factor(reference)
     words[:, first:last] = records.view(np.uint32)
@@ -152,7 +152,7 @@ def _channel(reference: Reference) -> int:
 
 
 def _factor(reference: Reference) -> tuple[float, float, float]:
-    if isinstance(reference, NormalTexture):
+    if isinstance(reference, NormalTexture | HeightTexture):
         return reference.scale, 0.0, 0.0
     return reference.factor if isinstance(reference, ColorTexture) else (reference.factor, 0.0, 0.0)
 
@@ -191,6 +191,8 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
             along = charts.get(use.material, own)
             if own != along:
                 yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
+            continue
+        if isinstance(use.reference, HeightTexture):
             continue
         low, high = use.bounds
         pixels = listed(use)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, get_args
 
 from service.scene.base import OMITTABLE, Model, hint
-from service.scene.texture import AnyFraction, AnyRadiometric, NormalTexture
+from service.scene.texture import AnyFraction, AnyRadiometric, HeightTexture, NormalTexture
 
 Emission = Annotated[
     AnyRadiometric,
@@ -31,6 +31,11 @@ NormalMap = Annotated[
     OMITTABLE,
     hint("Normal map", "Bends the surface's normal without moving the surface.", group="Geometry"),
 ]
+Height = Annotated[
+    HeightTexture | None,
+    OMITTABLE,
+    hint("Height", "Relief: bends the normal, and moves the surface of meshes with displacement.", group="Geometry"),
+]
 
 
 class AnySurface(Model):
@@ -54,6 +59,7 @@ class SolidSurface(AnySurface):
     emission: Emission = (0.0, 0.0, 0.0)
     emission_sides: EmissionSides = "front"
     normal_map: NormalMap = None
+    height: Height = None
 
 
 class Surface(AnySurface):
@@ -84,3 +90,4 @@ class Surface(AnySurface):
         ),
     ] = None
     normal_map: NormalMap = None
+    height: Height = None

@@ -36,6 +36,7 @@ GOOD: dict[str, Any] = {
             "albedo": {"texture": "wood", "channel": "r", "factor": 0.5},
             "alpha": {"texture": "wood", "channel": "a"},
             "normal_map": {"texture": "wood", "scale": 2},
+            "height": {"texture": "wood", "scale": -0.1},
         },
     },
     "textures": {
@@ -143,6 +144,8 @@ STRUCTURE = {
     "/materials/t/alpha/factor": ([1, 1, 1], "#ffffff", -1, INF),
     "/materials/t/normal_map/texture": ("nosuch", GONE),
     "/materials/t/normal_map/scale": (-1, NAN),
+    "/materials/t/height/texture": ("nosuch", GONE),
+    "/materials/t/height/scale": (1e10, NAN, "deep"),
     "/materials/t/normal_map/factor": (1,),
     "/materials/t/clearcoat_normal_map": ({"texture": "tiles"},),
     "/materials/a/normal_map": (0.5, None, "wood"),

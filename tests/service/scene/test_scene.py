@@ -40,6 +40,7 @@ def test_defaults() -> None:
         "specular_tint": 0, "roughness": 0.5, "anisotropic": 0, "sheen": 0, "sheen_tint": 0.5, "clearcoat": 0,
         "clearcoat_gloss": 1, "emission": (0, 0, 0), "emission_sides": "front", "alpha": 1, "alpha_cutoff": None,
         "normal_map": None,
+        "height": None,
     }  # fmt: skip
     mesh = scene({"type": "mesh", "asset": "bunny.obj", "material": "a"}).shapes[0]
     assert isinstance(mesh, MeshShape) and mesh.double_sided and mesh.transform is None

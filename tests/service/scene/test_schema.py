@@ -85,7 +85,7 @@ def test_every_parameter_of_a_material_belongs_to_a_group() -> None:
 def test_material_forms_begin_with_what_is_their_own() -> None:
     disney = list(models()["DisneyMaterial"]["properties"])
     assert disney[:2] == ["type", "base_color"]
-    assert disney[-5:] == ["emission", "emission_sides", "alpha", "alpha_cutoff", "normal_map"]
+    assert disney[-6:] == ["emission", "emission_sides", "alpha", "alpha_cutoff", "normal_map", "height"]
     assert {"subsurface", "metallic", "specular", "specular_tint", "roughness", "anisotropic", "sheen", "sheen_tint",
             "clearcoat", "clearcoat_gloss"} <= set(disney)  # fmt: skip
 

@@ -1,0 +1,150 @@
+"""Meshes whose surface a height moves: cut into small triangles, whose vertices move along the normal.
+
+The moved mesh has the normals of the one before, and kernels bend these by the same height as where nothing moves: so
+its shading is that of the displaced surface to the texel, however long the edges are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.assets import MeshData
+from service.pack.geometry.subdivision import TooManyTriangles, moved, subdivided
+from service.pack.geometry.vertex_normals import corner_normals, same, split
+from service.pack.textures.heights import HeightField
+from service.problems import FieldError, InvalidDocument
+
+PARTS = 200  # of a mesh's size is the longest edge where the document gives none
+# Triangles of a mesh are this times its area over the square of the longest edge, at most: edges are cut in halves.
+DENSITY = 10.0
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """What moves a mesh. `axes` is the linear part of its transform: heights and edges are metres in the world."""
+
+    field: HeightField
+    max_edge: float | None
+    axes: np.ndarray
+    shape: int  # its index in the document
+
+
+def displaced(data: MeshData, smooth: np.ndarray | bool, by: Displacement, room: int) -> MeshData:
+    """The moved mesh, in its own space, with the normals of the surface before. Raises InvalidDocument where it would
+    have more than `room` triangles."""
+    if not len(data.faces):
+        return data
+    rows, faces, columns = _rows(data, smooth)
+    try:
+        rows, faces = subdivided(rows, faces, by.axes, _max_edge(data, by), room)
+    except TooManyTriangles:
+        raise _too_many(data, by, room) from None
+    uvs = columns["uvs_1" if by.field.uv_set else "uvs"]
+    vertices, normals = rows[:, :3], rows[:, columns["normals"]]
+    # One displacement for each position: else the surface would open along seams of texture coordinates or normals.
+    place = same(vertices)
+    heights = _means(place, by.field.at(rows[:, uvs])[:, None])
+    along = _along(place, normals, same(vertices, normals.astype(np.float32)), by.axes)
+    vertices = vertices + moved(along * heights, np.linalg.inv(by.axes))[place]
+
+    def part(name: str) -> np.ndarray | None:
+        return rows[:, columns[name]].astype(np.float32) if name in columns else None
+
+    return replace(
+        data,
+        vertices=vertices,
+        faces=faces.astype(np.int32),
+        normals=part("normals"),
+        groups=None,
+        uvs=part("uvs"),
+        uvs_1=part("uvs_1"),
+        colors=part("colors"),
+        tangents=part("tangents"),
+    )
+
+
+def _rows(data: MeshData, smooth: np.ndarray | bool) -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
+    """The attributes of vertices side by side, a vertex for each normal at a position; the faces in these; and the
+    columns by their names."""
+    normals, places = _normals(data, smooth)
+    keys, corners = np.unique(data.faces.astype(np.int64) * len(normals) + places, return_inverse=True)
+    which, normal = np.divmod(keys, len(normals))
+    parts, columns, end = [data.vertices[which], normals[normal]], {"normals": slice(3, 6)}, 6
+    for name in ("uvs", "uvs_1", "colors", "tangents"):
+        values = getattr(data, name)
+        if values is not None:
+            parts.append(values[which])
+            columns[name] = slice(end, end + values.shape[1])
+            end = columns[name].stop
+    return np.concatenate(parts, axis=1, dtype=np.float64), corners.reshape(-1, 3), columns
+
+
+def _normals(data: MeshData, smooth: np.ndarray | bool) -> tuple[np.ndarray, np.ndarray]:
+    """(unit normals (k, 3), (m, 3) which of them each corner has), outward; facets have those of the faces."""
+    vertices, faces = data.vertices, data.faces
+    across = _unit(
+        np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    )
+    of_face = np.repeat(np.arange(len(faces))[:, None], 3, axis=1)
+    if not np.any(smooth):
+        return across, of_face
+    if data.normals is not None:
+        normals, places = _unit(data.normals.astype(np.float64)), faces.astype(np.int64)
+    elif isinstance(smooth, np.ndarray):
+        which, group, parts = split(faces, smooth)
+        normals, joined = corner_normals(vertices[which], parts, group)
+        places = joined.astype(np.int64)
+    else:
+        normals, joined = corner_normals(vertices, faces)
+        places = joined.astype(np.int64)
+    behind = (np.einsum("ikj,ij->ik", normals[places], across) < 0).all(axis=1)
+    missing = np.asarray(~normals.any(axis=1))[places]
+    places = np.where(behind[:, None], places + len(normals), places)
+    places = np.where(missing, 2 * len(normals) + of_face, places)
+    return np.concatenate([normals, -normals, across]), places
+
+
+def _along(place: np.ndarray, normals: np.ndarray, distinct: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(k, 3): for each position the world's direction in which it moves, the mean of the normals there; zero where
+    they cancel. Equal ones, by their numbers `distinct`, count once."""
+    _, first = np.unique(distinct, return_index=True)
+    total = np.zeros((int(place.max()) + 1, 3))
+    for k in range(3):
+        total[:, k] = np.bincount(place[first], _unit(normals[first])[:, k], len(total))
+    total[np.einsum("ij,ij->i", total, total) < 1e-12] = 0
+    return _unit(moved(total, np.linalg.inv(axes).T))
+
+
+def _means(place: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(k, c): the mean of the rows of each position."""
+    counts = np.bincount(place)
+    sums = [np.bincount(place, column) for column in rows.T]
+    return np.asarray(np.stack(sums, axis=1) / counts[:, None])
+
+
+def _max_edge(data: MeshData, by: Displacement) -> float:
+    if by.max_edge is not None:
+        return by.max_edge
+    low, high = data.bounds
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    return max(float(np.ptp(moved(corners, by.axes), axis=0).max()) / PARTS, 1e-30)
+
+
+def _too_many(data: MeshData, by: Displacement, room: int) -> InvalidDocument:
+    p = moved(data.vertices, by.axes)[data.faces]
+    area = float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()) / 2
+    enough = math.sqrt(DENSITY * area / max(room, 1))
+    detail = (
+        f"edges of at most {_max_edge(data, by):.3g} m take more triangles than the {room} that SUNBOX_MAX_TRIANGLES "
+        f"leaves for this mesh; {enough:.2g} m would do"
+    )
+    return InvalidDocument([FieldError(f"/shapes/{by.shape}/max_edge", detail)])
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.asarray(np.divide(v, length, out=np.zeros_like(v, dtype=np.float64), where=length > 0))
