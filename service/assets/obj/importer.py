@@ -49,15 +49,15 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
         notes.add(name, warning)
     library = _library(path, read.libraries, archive, notes)
     textures = Textures(archive, files, notes, limits)
-    materials = Materials(library, textures, mesh.uvs is not None, notes)
+    used = mesh.vertices[np.unique(mesh.faces)]
+    bounds = used.min(axis=0), used.max(axis=0)
+    materials = Materials(library, textures, mesh.uvs is not None, float(np.ptp(bounds, axis=0).max()), notes)
     shapes = [
         _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
         for worn, which in _by_material(read)
     ]
     group = name[: -len(".obj")]
     shapes = [{"name": f"{group}/{shape['material']}" if len(shapes) > 1 else group} | shape for shape in shapes]
-    used = mesh.vertices[np.unique(mesh.faces)]
-    bounds = used.min(axis=0), used.max(axis=0)
     document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
     if textures.documents:
         document["textures"] = textures.documents

@@ -15,6 +15,7 @@ DEFAULT_IOR, MAX_IOR = 1.5, 4.0
 SPECULAR_F0 = 0.08  # reflectance head-on of principled's specular 1
 # The illumination models of `illum`: 0 and 1 have no highlight; 3 and 5 are mirrors; 4, 6, 7 and 9 are glass.
 WITHOUT_HIGHLIGHT, MIRRORS, GLASS, REFRACTS = (0, 1), (3, 5), (4, 6, 7, 9), (6, 7)
+RELIEF = 0.01  # of the model's size
 DARK = 0.1  # share of Ks: a mirror whose Kd is darker than that is a metal of colour Ks
 PBR = ("pr", "pm", "ps", "pc", "pcr", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr")
 
@@ -22,9 +23,13 @@ PBR = ("pr", "pm", "ps", "pc", "pcr", "map_pr", "map_pm", "map_ps", "map_pc", "m
 class Materials:
     """The materials that faces use; `documents` are the finished ones by name."""
 
-    def __init__(self, library: dict[str, MtlMaterial], textures: Textures, has_uvs: bool, notes: Warnings) -> None:
-        """`has_uvs`: whether the mesh has texture coordinates, without which no texture is used."""
+    def __init__(
+        self, library: dict[str, MtlMaterial], textures: Textures, has_uvs: bool, size: float, notes: Warnings
+    ) -> None:
+        """`has_uvs`: whether the mesh has texture coordinates, without which no texture is used. `size` is its
+        greatest extent."""
         self.library, self.textures, self.has_uvs, self.notes = library, textures, has_uvs, notes
+        self.relief = float(f"{RELIEF * size:.2g}")  # metres from black to white where a library does not say
         self.documents: dict[str, dict[str, Any]] = {}
 
     def add(self, name: str, place: str) -> str:
@@ -61,7 +66,7 @@ class _Converter:
         document |= self._layers()
         if is_glass:
             document["transmission"] = 1 - opacity if opacity < 1 else 1.0
-        shared = self._emission() | self._normal() | self._alpha(1.0 if is_glass else opacity)
+        shared = self._emission() | self._relief() | self._alpha(1.0 if is_glass else opacity)
         if set(document) == {"type", "base_color", "metallic", "specular", "roughness"} and (
             document["metallic"] == document["specular"] == 0
         ):
@@ -185,17 +190,36 @@ class _Converter:
             return {"emission": {"texture": texture, "factor": _plain(values) if max(values) else 1.0}}
         return {"emission": _plain(values)} if max(values) else {}
 
-    def _normal(self) -> dict[str, Any]:
-        found = self._map("norm")
-        heights = self._map("map_bump")
-        if found is None and heights is not None:
-            if not self.owner.textures.holds(heights):
-                return {}
-            if not self.owner.textures.is_normal_map(heights):
-                self.notes.add(heights.place, "heights (bump) are not supported; a normal map (norm) is")
-                return {}
-            self.notes.add(heights.place, "the image under bump holds normals and is used as a normal map")
-            found = heights
+    def _relief(self) -> dict[str, Any]:
+        """Normals and heights. The image under bump may be of either."""
+        normals, bump, disp = self._map("norm"), self._map("map_bump"), self._map("disp")
+        bump, disp = (each if each is not None and self.owner.textures.holds(each) else None for each in (bump, disp))
+        if bump is not None and self.owner.textures.is_normal_map(bump):
+            if normals is None:
+                self.notes.add(bump.place, "the image under bump holds normals and is used as a normal map")
+                normals = bump
+            bump = None
+        if bump is not None and disp is not None:
+            self.notes.add(disp.place, "the heights under bump are used, and not these")
+        found = self._normal(normals)
+        return found | self._height(bump or disp, bool(found))
+
+    def _height(self, found: Map | None, has_normals: bool) -> dict[str, Any]:
+        texture = None if found is None else self.owner.textures.use(found)
+        if found is None or texture is None:
+            return {}
+        if "-bm" in found.options:
+            scale = _number(found.options["-bm"])
+            assumed = f"-bm {scale:g} is taken for the metres from black to white"
+        else:
+            scale = self.owner.relief
+            assumed = f"without -bm, {scale:g} m from black to white are assumed: 1 % of the model's size"
+        shown = "; the normal map shows them, unless a shape has displacement" if has_normals else ""
+        self.notes.add(found.place, f"the image holds heights; {assumed}{shown}")
+        height = {"texture": texture, "channel": self.owner.textures.channel(found, "r"), "scale": scale}
+        return {"height": height | ({"shading": False} if has_normals else {})}
+
+    def _normal(self, found: Map | None) -> dict[str, Any]:
         texture = None if found is None else self.owner.textures.use(found)
         if found is None or texture is None:
             return {}

@@ -16,8 +16,9 @@ from service.assets.scenes.warnings import Warnings
 MAX_BYTES = 16 << 20  # bytes of a library; a thousand materials take 0.3 MiB
 COLORS = {"ka", "kd", "ks", "ke", "tf"}
 SCALARS = {"ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "aniso", "anisor"}
-MAPS = {"map_kd", "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr", "norm", "map_bump"}
-ALIASES = {"bump": "map_bump", "map_norm": "norm", "map_kn": "norm", "map_opacity": "map_d"}
+MAPS = {"map_kd", "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr", "norm", "map_bump",
+        "disp"}  # fmt: skip
+ALIASES = {"bump": "map_bump", "map_disp": "disp", "map_norm": "norm", "map_kn": "norm", "map_opacity": "map_d"}
 # Ambient light: nearly every library has it, and as light is traced it has no place in the picture. Their places are
 # recorded for materials that have nothing else.
 AMBIENT = {"ka", "map_ka"}
@@ -25,8 +26,6 @@ IGNORED = {
     "map_ns": "exponents in a texture (map_Ns) are not supported; Ns is used alone",
     "map_tr": "map_Tr is not supported; map_d is",
     "map_tf": "map_Tf is not supported; Tf is used alone",
-    "disp": "displacement (disp) is not supported",
-    "map_disp": "displacement (map_disp) is not supported",
     "decal": "decals are not supported",
     "map_decal": "decals are not supported",
     "refl": "reflection maps (refl) are not used: reflections are traced",

@@ -26,6 +26,7 @@ SCALARS: dict[Role, str] = {
     "roughness": "roughness", "gloss": "roughness", "metallic": "metallic", "opacity": "alpha",
     "specular": "specular",
 }  # fmt: skip
+RELIEF = 0.02  # metres from black to white, as of bricks or bark: images do not say
 # What a document needs beside materials; nobody sees it.
 CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
@@ -43,7 +44,7 @@ def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
     textures = _Textures(images, files, limits)
-    materials = {name: _material(each, textures) for name, each in sets.items()}
+    materials = {name: _material(each, textures, notes) for name, each in sets.items()}
     document = {
         "version": 1, "camera": CAMERA, "materials": materials, "textures": textures.documents, "shapes": [],
     }  # fmt: skip
@@ -95,7 +96,7 @@ def _is_baked(source: Source, role: Role) -> bool:
     return role == "gloss" or (role == "normal" and bool(source.meaning.directx))
 
 
-def _material(images: TextureSet, textures: _Textures) -> dict[str, Any]:
+def _material(images: TextureSet, textures: _Textures, notes: Warnings) -> dict[str, Any]:
     out: dict[str, Any] = {"type": "principled"}
     for role, source in images.sources.items():
         name = textures.use(source, role)
@@ -105,6 +106,12 @@ def _material(images: TextureSet, textures: _Textures) -> dict[str, Any]:
             out["emission"] = {"texture": name}
         elif role == "normal":
             out["normal_map"] = {"texture": name}
+        elif role == "height":
+            out["height"] = {"texture": name, "scale": RELIEF}
+            shown = "with displacement, else the normal map shows them" if "normal" in images.sources else "as bumps"
+            notes.add(source.path, f"heights, shown {shown}; {RELIEF:g} m from black to white are assumed")
+            if "normal" in images.sources:
+                out["height"]["shading"] = False  # it is of the same relief
         else:
             channel = {} if role == "gloss" or not source.channel else {"channel": source.channel}
             out[SCALARS[role]] = {"texture": name, **channel}

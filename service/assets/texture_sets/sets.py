@@ -12,7 +12,6 @@ from service.assets.texture_sets.names import Meaning, Role, meaning
 # Things that no parameter has: they are left out, with a warning.
 LEFT_OUT: dict[Role, str] = {
     "occlusion": "ambient occlusion is left out: the light that reaches a corner is traced",
-    "height": "heights are not supported yet; the normal map shows the relief",
     "other": "there is no parameter for such an image; it is left out",
 }
 

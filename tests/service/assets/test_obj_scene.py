@@ -126,9 +126,10 @@ def test_statements_become_parameters(store: AssetStore, text: str, expected: di
         ("Ka 1 1 1", "a colour of ambient light (Ka) is not used; Kd is"),
         ("Ka 1 0 0\nKd 0 0 0", "a colour of ambient light (Ka) is not used; Kd is"),
         ("Kd .5 .5 .5\nmap_Ka grey.png", "a texture of ambient light (map_Ka) is not used; map_Kd is"),
-        ("bump grey.png", "heights (bump) are not supported"),
+        ("bump grey.png", "without -bm, 0.01 m from black to white are assumed"),
+        ("bump -bm 0.05 grey.png", "-bm 0.05 is taken for the metres"),
         ("map_Bump normals.png", "is used as a normal map"),
-        ("disp grey.png", "displacement"),
+        ("norm normals.png\ndisp grey.png", "the normal map shows them"),
         ("refl -type sphere grey.png", "reflection maps"),
         ("map_Kd lost.png", "the texture 'lost.png' is not there"),
         ("map_Kd C:\\\\pictures\\\\lost.png", "is not there beside the library"),
@@ -154,6 +155,23 @@ def test_what_is_not_taken_is_said(store: AssetStore, text: str, detail: str) ->
     _, details = material(store, text)
     assert [said for said in details if detail in said], details
     assert len(details) == 1, details
+
+
+@pytest.mark.parametrize(
+    ("text", "height", "said"),
+    [
+        ("bump -bm 0.05 grey.png", {"scale": 0.05}, ["-bm 0.05 is taken for the metres"]),
+        ("map_disp -imfchan b fading.png", {"texture": "fading", "channel": "b"}, ["0.01 m from black to white"]),
+        ("disp grey.png\nbump fading.png", {"texture": "fading"}, ["under bump are used", "holds heights"]),
+        ("norm normals.png\nbump grey.png", {"shading": False}, ["unless a shape has displacement"]),
+        ("bump normals.png\ndisp grey.png", {"shading": False}, ["holds normals", "unless a shape"]),
+    ],
+)
+def test_bump_and_disp_are_heights(store: AssetStore, text: str, height: dict[str, Any], said: list[str]) -> None:
+    found, details = material(store, text)
+    assert found["height"] == {"texture": "grey", "channel": "r", "scale": 0.01} | height
+    assert ("normal_map" in found) == ("normals.png" in text)
+    assert len(details) == len(said) and all(any(each in d for d in details) for each in said), details
 
 
 def test_a_texture_needs_coordinates(store: AssetStore) -> None:

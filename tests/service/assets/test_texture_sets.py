@@ -29,7 +29,7 @@ SETS: dict[str, tuple[str, dict[str, str]]] = {
         "Bricks001_1K-JPG_Color Bricks001_1K-JPG_NormalGL Bricks001_1K-JPG_NormalDX Bricks001_1K-JPG_Roughness "
         "Bricks001_1K-JPG_AmbientOcclusion Bricks001_1K-JPG_Displacement Bricks001",
         {"base_color": "Bricks001_1K-JPG_Color", "roughness": "Bricks001_1K-JPG_Roughness",
-         "normal_map": "Bricks001_1K-JPG_NormalGL"},
+         "normal_map": "Bricks001_1K-JPG_NormalGL", "height": "Bricks001_1K-JPG_Displacement"},
     ),
     "ambientCG, a metal": (
         "Metal032_2K-PNG_Color Metal032_2K-PNG_Metalness Metal032_2K-PNG_Opacity Metal032_2K-PNG_Emission",
@@ -40,7 +40,8 @@ SETS: dict[str, tuple[str, dict[str, str]]] = {
         "rusty_metal_02_diff_1k rusty_metal_02_nor_gl_1k rusty_metal_02_rough_1k rusty_metal_02_arm_1k "
         "rusty_metal_02_disp_1k rusty_metal_02_ao_1k",
         {"base_color": "rusty_metal_02_diff_1k", "normal_map": "rusty_metal_02_nor_gl_1k",
-         "roughness": "rusty_metal_02_rough_1k", "metallic": "rusty_metal_02_arm_1k b"},
+         "roughness": "rusty_metal_02_rough_1k", "metallic": "rusty_metal_02_arm_1k b",
+         "height": "rusty_metal_02_disp_1k"},
     ),
     "Quixel": (
         "vglkdeh_4K_Albedo vglkdeh_4K_Normal_LOD0 vglkdeh_4K_Roughness vglkdeh_4K_Specular vglkdeh_4K_Cavity",
@@ -58,11 +59,13 @@ SETS: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "3dtextures": (
         "Stone_Wall_013_basecolor Stone_Wall_013_ambientOcclusion Stone_Wall_013_height Stone_Wall_013_opacity",
-        {"base_color": "Stone_Wall_013_basecolor", "alpha": "Stone_Wall_013_opacity"},
+        {"base_color": "Stone_Wall_013_basecolor", "alpha": "Stone_Wall_013_opacity",
+         "height": "Stone_Wall_013_height"},
     ),
     "Poliigon": (
         "GroundDirt_COL_3K GroundDirt_NRM_3K GroundDirt_REFL_3K GroundDirt_DISP_3K",
-        {"base_color": "GroundDirt_COL_3K", "normal_map": "GroundDirt_NRM_3K", "specular": "GroundDirt_REFL_3K"},
+        {"base_color": "GroundDirt_COL_3K", "normal_map": "GroundDirt_NRM_3K", "specular": "GroundDirt_REFL_3K",
+         "height": "GroundDirt_DISP_3K"},
     ),
     "Substance to Unreal Engine": (
         "Barrel_BaseColor Barrel_OcclusionRoughnessMetallic Barrel_Emissive",
@@ -117,6 +120,8 @@ def test_a_set_becomes_one_material(store: AssetStore, naming: str) -> None:
         for member, reference in material.items()
     }
     assert taken == expected
+    if "height" in material:  # the normal map has the same relief
+        assert material["height"].get("shading", True) == ("normal_map" not in material)
     coloured = {material[member]["texture"] for member in ("base_color", "emission") if member in material}
     assert {n for n, each in document["textures"].items() if each["color_space"] == "srgb"} == coloured
 
@@ -188,6 +193,8 @@ def test_materials_are_parted_by_what_their_names_share_and_what_is_not_taken_is
     notes = {note["pointer"]: note["detail"] for note in imported.warnings}
     assert notes.keys() == {"oak_height.png", "oak_normal_dx.png", "body_color.1001.png", "readme.txt", "cover.png"}
     assert "oak_normal_gl.png" in notes["oak_normal_dx.png"] and "UDIM" in notes["body_color.1001.png"]
+    assert "0.02 m from black to white are assumed" in notes["oak_height.png"]
+    assert imported.document["materials"]["oak"]["height"]["scale"] == 0.02
 
 
 def test_a_zip_without_such_images_is_refused(store: AssetStore) -> None:
