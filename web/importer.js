@@ -1,7 +1,7 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
 // images textures, several of one set a material, glTF and zipped OBJ a scene, JSON what it says it is.
 
-import { fetchAssetMaterials, fetchAssetScene, upload } from "./server/api.js";
+import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
 import { accepted, browse, kindOf } from "./lib/files.js";
@@ -180,8 +180,11 @@ export class Importer {
     else throw new Error("It holds neither a scene nor a material.");
   }
 
-  async #takeScene({ id, bounds, exposure, warnings = [] }, file, way) {
-    const document = await fetchAssetScene(id);
+  async #takeScene(info, file, way) {
+    const { id, exposure, warnings = [] } = info;
+    const posed = await this.#posed(info, file, way);
+    if (!posed) return false;
+    const { document, bounds } = posed;
     if (way === "add") return this.#addScene(document, file, { bounds, warnings });
     const whole = bounds && { low: bounds[0], high: bounds[1] };
     if (whole) remember(document.shapes, whole);
@@ -192,6 +195,15 @@ export class Importer {
     const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", isUnderNoSky(document) ? studioToo : null);
     return true;
+  }
+
+  // {document, bounds} of a scene's file, of one that moves or has variants as the person wants it; null where not.
+  async #posed({ id, bounds, ...info }, file, way) {
+    if (!info.variants && !info.animations) return { document: await fetchAssetScene(id), bounds };
+    this.messages.hide("upload"); // it is here
+    const { askPose } = await import("./model-pose.js");
+    const pose = await askPose(file, { id, ...info }, way === "add" ? "Add" : "Open");
+    return pose && fetchPosedScene(id, pose);
   }
 
   // On a ground, where the model brings none.
