@@ -1,5 +1,5 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, several of one set a material, glTF and zipped OBJ a scene, JSON what it says it is.
+// images textures, several of one set a material, as MaterialX does, glTF and zipped OBJ a scene, JSON what it says.
 
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
@@ -22,7 +22,10 @@ const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes af
 
 const ACCEPT = accepted(ORDER);
 
-const isZip = (file) => file.name.toLowerCase().endsWith(".zip");
+const endsIn = (file, ending) => file.name.toLowerCase().endsWith(ending);
+const isMaterialX = (file) => endsIn(file, ".mtlx");
+// What these hold is known when they are there: a scene, or materials.
+const isOpen = (file) => endsIn(file, ".zip") || isMaterialX(file);
 
 const stem = (file) =>
   file.name
@@ -61,17 +64,20 @@ export class Importer {
     }
   }
 
-  // Whether several images were a texture set: the server knows by their names.
+  // Whether several images were a texture set: the server knows by their names, or by a file that comes with them.
   async #takeImages(files, at) {
     const isImage = (file) => ["image", "light"].includes(kindOf(file));
-    if (!files.every(isImage) || files.filter((file) => kindOf(file) === "image").length < 2) return false;
+    const images = files.filter((file) => kindOf(file) === "image").length;
+    const described = files.some(isMaterialX) && files.length > 1;
+    if (!files.every((file) => isImage(file) || isMaterialX(file)) || (images < 2 && !described)) return false;
+    const name = `${files.length} ${described ? "files" : "images"}`;
     try {
-      const archive = await zip(files, `${files.length} images`);
+      const archive = await zip(files, name);
       await this.#takeMaterials(await this.upload(archive), archive, at);
       return true;
     } catch (problem) {
       if (problem.status === 422) return false; // one after the other, then
-      this.#refuse({ name: `${files.length} images` }, problem);
+      this.#refuse({ name }, problem);
       return true;
     } finally {
       this.messages.hide("upload");
@@ -95,8 +101,7 @@ export class Importer {
       this.reopen(recipe, stem(file));
       return true;
     }
-    // What a zip holds is known when it is there.
-    const zipped = isZip(file) ? await this.upload(file) : null;
+    const zipped = isOpen(file) ? await this.upload(file) : null;
     if (zipped?.kind === "materials") return this.#takeMaterials(zipped, file, at);
     const chosen = kind === "scene" ? (way ?? (await this.#ask(file))) : way;
     if (kind === "scene" && chosen === null) return false;

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.asset_files import png
+from tests.mtlx_files import from_graph, graph, mtlx, node, surface, value
 from tests.obj_files import zipped
 from tests.web.conftest import Editor
 from tests.web.editing import document, overlay
@@ -57,6 +59,20 @@ def test_several_images_are_a_set_by_their_names(editor: Editor) -> None:
     (refused,) = editor.complaints  # the browser's own line on the server's answer that they are no set
     assert "422" in refused
     editor.complaints.clear()
+
+
+def test_materialx_makes_the_material_with_the_images_that_come_with_it(editor: Editor) -> None:
+    pytest.importorskip("MaterialX")
+    editor.settled()
+    image = node("image", "img", "color3", value("file", "maps/moss.png", "filename", colorspace="srgb_texture"))
+    made = mtlx(graph(image, out="img color3"), surface("gltf_pbr", from_graph("base_color", "out"), name="Moss"))
+    editor.drop("#stage", {"moss.mtlx": made, "moss.png": png(GREEN)})
+    editor.wait("what went where", lambda: "2 files is the material Moss." in editor.text("#messages"))
+    editor.wait("a green ball", lambda: is_green(editor))
+    plain = mtlx(surface("gltf_pbr", value("base_color", [0.5, 0.5, 0.5]), value("iridescence", 1), name="Grey"))
+    editor.drop("#stage", {"grey.mtlx": plain})
+    editor.wait("the other", lambda: "grey.mtlx is the material Grey." in editor.text("#messages"))
+    assert "SGrey/iridescence" in editor.text("#messages"), "what is lost is listed"
 
 
 def test_two_sets_in_a_zip_are_two_materials(editor: Editor) -> None:

@@ -6,6 +6,7 @@ const KINDS = {
   gltf: "scene",
   glb: "scene",
   zip: "scene",
+  mtlx: "scene",
   obj: "mesh",
   ply: "mesh",
   stl: "mesh",
