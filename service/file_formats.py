@@ -16,7 +16,7 @@ def told() -> dict[str, Any]:
         "pictures": list(get_args(FileFormat)),
         "animations": list(animation.FORMATS),
         **{name: [format for format, each in KINDS.items() if each == kind] for name, kind in READ.items()},
-        "materials": ["zip"],
+        "materials": ["zip", "mtlx"],
         "compressions": list(COMPRESSIONS),
         "missing": missing(),
     }

@@ -20,6 +20,7 @@ readers       readers of single formats
 gltf          the reader of glTF
 obj           the importer of OBJ files with materials and textures
 texture_sets  the importer of images that make materials by their names
+materialx     the importer of MaterialX
 scenes        parts that the importers of whole scenes share
 """
 

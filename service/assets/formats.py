@@ -11,7 +11,11 @@ from service.assets.types import Kind
 COMPRESSIONS = ("draco", "meshopt", "ktx2")  # of meshes and images inside glTF files
 
 # What installs the package that a format needs, and the module by which it is known to be there.
-PACKAGES: dict[str, tuple[str, str]] = {"meshopt": ("meshopt", "meshopt"), "ktx2": ("opengl-basisu", "opengl_basisu")}
+PACKAGES: dict[str, tuple[str, str]] = {
+    "meshopt": ("meshopt", "meshopt"),
+    "ktx2": ("opengl-basisu", "opengl_basisu"),
+    "mtlx": ("sunbox-server[materialx]", "MaterialX"),
+}
 
 KINDS: dict[str, Kind] = {
     "obj": "mesh",
@@ -20,6 +24,7 @@ KINDS: dict[str, Kind] = {
     "glb": "scene",
     "gltf": "scene",
     "zip": "scene",  # or "materials", by what is in it
+    "mtlx": "materials",
     "exr": "image",
     "hdr": "image",
     "png": "image",
@@ -50,6 +55,8 @@ CONTENT_TYPES = {
     "model/gltf+json": "gltf",
     "application/zip": "zip",
     "application/x-zip-compressed": "zip",
+    "application/mtlx+xml": "mtlx",
+    "application/x-materialx": "mtlx",
     "image/x-exr": "exr",
     "image/aces": "exr",
     "image/vnd.radiance": "hdr",
@@ -66,6 +73,10 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
+# After what XML has before its root; possessive for the same reason.
+MTLX_TEXT = re.compile(
+    rb"(?:\s++|<\?[^>]*+>|<!--(?:(?!-->).)*+-->|<![A-Z][^>\[]*+(?:\[[^\]]*+\]\s*+)?>)*+<materialx[\s>]", re.DOTALL
+)
 
 
 @cache
@@ -99,6 +110,8 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
         return "stl"
     if GLTF_TEXT.match(words) and data.find(b'"asset"') >= 0:
         return "gltf"
+    if MTLX_TEXT.match(words):
+        return "mtlx"
     if OBJ_START.match(words):
         return "obj"
     named = (content_type or "").partition(";")[0].strip().lower()

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
-    "make materials by their names; "
+    "make materials by their names; MaterialX; "
     "EXR, Radiance HDR, PNG, JPEG and WebP images"
 )
 TAKEN_APART: tuple[Kind, ...] = ("scene", "materials")  # kinds of files whose parts are assets of their own
@@ -94,7 +94,7 @@ class AssetStore:
         format = format_of(data, content_type, filename)
         if format is None:
             raise UnsupportedMedia(f"the format is not supported; supported are {FORMATS}")
-        if KINDS[format] == "scene":
+        if KINDS[format] in TAKEN_APART:
             return self._import(id, format, data, True, room, title)[0]
         info = self._described(id, format, data)
         with (room or self.room)(expected((size, RECORD_BYTES))):

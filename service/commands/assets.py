@@ -29,10 +29,6 @@ class SourceAssets:
         """Raises AssetError."""
         return self._found.image(self._where(ref))
 
-    def read(self, ref: str) -> bytes:
-        """The bytes of a file. Raises AssetError."""
-        return self._found.read(self._where(ref))
-
     def keep(self, scene: Any) -> None:
         """Copy the files that a document refers to into the data folder, so that its picture can be made again
         without them. Where there is no room, they stay needed.

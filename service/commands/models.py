@@ -1,7 +1,7 @@
 """Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY or
-an STL.
+an STL; and materials, a .mtlx with its images beside it.
 
-The importer always reads one file: a .gltf with its files inlined, an OBJ and its files as a zip.
+The importer always reads one file: a .gltf with its files inlined, an OBJ or a .mtlx and its files as a zip.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from service.assets.types import Pose
 
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip")
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip", ".mtlx")
 WHOLE = ("glb", "zip", "ply", "stl")  # formats that are one file
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 
 def is_model(path: Path, data: bytes) -> bool:
     """By its name or its bytes; of JSON by the object `asset` at its root, which no scene's document has."""
-    if path.suffix.lower() in SUFFIXES or sniff(data) in (*WHOLE, "obj"):
+    if path.suffix.lower() in SUFFIXES or sniff(data) in (*WHOLE, "obj", "mtlx"):
         return True
     try:
         tree = load(data) if b'"asset"' in data else None
@@ -52,6 +52,8 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, 
     title = None
     if format == "obj":
         data, title = _zipped(path, data, files), "the OBJ file"
+    elif format == "mtlx":
+        data, format, title = _with_images(path, data, files), "zip", "the MaterialX file"
     elif format not in WHOLE:
         data, format = _embedded(data, files), "gltf"
     from service.assets.posing import posed_scene
@@ -66,12 +68,13 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, 
 
 
 def zipped_images(folder: Path) -> bytes:
-    """The images of a folder as a zip. Raises BadInput where there is none."""
+    """The images of a folder, and its MaterialX files, as a zip. Raises BadInput where there is none."""
     from service.assets.obj.importer import zipped
     from service.commands import files
 
     endings = tuple(f".{ending}" for ending, format in formats.SUFFIXES.items() if formats.KINDS[format] == "image")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in endings and path.is_file())
+    taken = (*endings, ".mtlx")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in taken and path.is_file())
     if not paths:
         raise BadInput(f"{str(folder)!r}: holds no images ({', '.join(endings)})")
     return zipped({f"{folder.resolve().name}/{path.name}": files.read(path) for path in paths})
@@ -115,6 +118,21 @@ def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
     own = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
     entries = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in found.items()}
     return zipped(entries | {posixpath.join(folder, own): data})
+
+
+def _with_images(path: Path, data: bytes, files: FileAssets) -> bytes:
+    """A zip of the MaterialX file and those of its images that exist; a larger one is refused as such."""
+    from service.assets.materialx.document import file_names
+    from service.assets.obj.importer import zipped
+    from service.assets.obj.paths import is_absolute, located
+
+    found = {located("", name): name for name in file_names(data) if "://" not in name and not is_absolute(name)}
+    entries = {place: files.read(place) for place, name in found.items() if _is_there(place, name, files)}
+    deep = max((name.split("/").count("..") for name in entries), default=0)
+    folder = "/".join(["model"] * deep)
+    named = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in entries.items()}
+    own = (path.name if path.suffix.lower() == ".mtlx" else f"{path.name}.mtlx").replace("\\", "_")
+    return zipped(named | {posixpath.join(folder, own): data})
 
 
 def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:

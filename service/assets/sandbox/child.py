@@ -82,7 +82,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.readers.rendered import parse_rendered
     from service.assets.sandbox.parse_mesh import parse_mesh
-    from service.assets.sandbox.parse_zip import parse_zip
+    from service.assets.sandbox.parse_zip import parse_mtlx, parse_zip
 
     size = os.fstat(source).st_size
     if not size:
@@ -94,6 +94,8 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
         return parse_mesh(format, mapped, limits)
+    if format == "mtlx":
+        return parse_mtlx(mapped, limits)
     return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits, pose)
 
 
@@ -103,7 +105,7 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
         animations = [vars(one) for one in parsed.animations]
         text = json.dumps(vars(parsed) | {"parts": parts, "animations": animations}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
-        return {"scene": [np.frombuffer(text, np.uint8)], "files": files}, {}
+        return {"scene": [np.frombuffer(text, np.uint8)], **({"files": files} if files else {})}, {}
     if isinstance(parsed, RenderedPicture):
         facts = {name: value for name, value in vars(parsed).items() if name != "layers"}
         return {"layers": [parsed.layers]}, facts

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from service.assets.errors import ParseError
 from service.assets.formats import text
 from service.assets.readers.mesh_checks import mesh_oddities
 from service.assets.readers.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
@@ -52,6 +53,10 @@ def _gltf(data: memoryview, limits: AssetLimits) -> RawMesh:
     return read_merged(data, limits)
 
 
+def _mtlx(data: memoryview, limits: AssetLimits) -> RawMesh:
+    raise ParseError("it holds materials; a mesh or an image is needed here")
+
+
 def _zip(data: memoryview, limits: AssetLimits) -> RawMesh:
     from service.assets.obj.importer import read_zipped_obj
 
@@ -65,4 +70,5 @@ READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "glb": _gltf,
     "gltf": _gltf,
     "zip": _zip,
+    "mtlx": _mtlx,
 }

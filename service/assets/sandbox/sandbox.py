@@ -9,6 +9,8 @@ from dataclasses import asdict, replace
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
@@ -215,7 +217,7 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
             (str(estimator), str(sampler), int(depth)),
         )  # fmt: skip
     if "scene" in arrays:
-        return _scene(arrays["scene"], arrays["files"])
+        return _scene(arrays["scene"], arrays.get("files", np.empty(0, np.uint8)))
     return mesh_of(arrays, tuple(map(str, reply["warnings"])), _oddities(reply["oddities"]))
 
 

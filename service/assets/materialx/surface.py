@@ -1,0 +1,101 @@
+"""One surface shader of a file, as the models' readers see it: its inputs as trees, and the material they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from service.assets.materialx.evaluation import fixed
+from service.assets.materialx.graph import Graphs
+from service.assets.materialx.trees import Tree, Unsupported
+from service.assets.materialx.values import Values
+
+# Ranges of parameters that are no shares, and colours without an upper end.
+RANGES = {
+    "ior": (1.0, 4.0), "attenuation_distance": (1e-9, 1e9), "anisotropic_rotation": (-1e9, 1e9),
+}  # fmt: skip
+BRIGHTEST = 1e6
+COLORS = ("base_color", "attenuation_color", "specular_color", "sheen_color", "emission")
+
+
+@dataclass
+class Surface:
+    """A shader node. `material` collects the parameters of `principled`."""
+
+    node: Any
+    graphs: Graphs
+    values: Values
+    material: dict[str, Any] = field(default_factory=lambda: {"type": "principled"})
+
+    def tree(self, name: str) -> Tree:
+        return self.graphs.input(self.node, name)
+
+    def place(self, name: str = "") -> str:
+        path = self.node.getNamePath()
+        return self.graphs.place(f"{path}/{name}" if name else path)
+
+    def note(self, name: str, detail: str) -> None:
+        self.graphs.notes.add(self.place(name), detail)
+
+    def constant(self, name: str) -> list[float] | None:
+        """The value of an input that is the same everywhere; None for any other, and for one without a meaning."""
+        try:
+            found = fixed(self.tree(name))
+        except Unsupported:
+            return None
+        return None if found is None else [float(one) for one in found]
+
+    def number(self, name: str, otherwise: float) -> float:
+        """The value of an input that must be the same everywhere."""
+        found = self.constant(name)
+        if found is None:
+            self.note(name, f"a value that differs from place to place is not supported here; {otherwise:g} is used")
+            return otherwise
+        return found[0]
+
+    def is_used(self, name: str, neutral: float) -> bool:
+        """Whether an input is other than the value by which it does nothing."""
+        found = self.constant(name)
+        return found is None or any(abs(one - neutral) > 1e-6 for one in found)
+
+    def lose(self, names: Iterable[tuple[str, float, str]]) -> None:
+        """Say of each of these inputs, where it is not neutral, that `principled` has nothing for it."""
+        for name, neutral, detail in names:
+            if self.is_used(name, neutral):
+                self.note(name, detail)
+
+    def put(self, parameter: str, name: str, tree: Tree, default: float | None = None) -> None:
+        """Set a parameter to a tree, whose place is that of the input `name`; not where that is its default."""
+        place = self.place(name)
+        try:
+            if parameter in COLORS:
+                value = self.values.color(tree, place, BRIGHTEST if parameter == "emission" else 1.0)
+            else:
+                value = self.values.number(tree, place, *RANGES.get(parameter, (0.0, 1.0)))
+        except Unsupported as problem:
+            self.graphs.notes.add(place, f"{problem}; the parameter is left out")
+            return
+        if default is None or isinstance(value, dict | list) or abs(value - default) > 1e-6:
+            self.material[parameter] = value
+
+    def normal(self, parameter: str, name: str, tree: Tree | None = None) -> None:
+        found = tree or self.graphs.normal(self.node, name)
+        if found is None or found.value is not None:
+            return  # the surface's own, or one direction for all of it, which has no meaning
+        try:
+            map = self.values.normal(found, self.place(name))
+        except Unsupported as problem:
+            self.graphs.notes.add(self.place(name), f"{problem}; the normal map is left out")
+            return
+        if map is not None:
+            self.material[parameter] = map
+
+    def is_black(self, tree: Tree) -> bool:
+        try:
+            found = fixed(tree)
+        except Unsupported:
+            return False
+        return found is not None and bool(np.abs(found).max() < 1e-9)
