@@ -1,7 +1,7 @@
 """Built-in scenes, materials, environments and stages: JSON documents, and assets that our own code makes for them.
 
 A file's `title` is for menus, its `kind` (of a material) for their parts, its `source` says where numbers were
-measured; none of them is part of the document.
+measured; none of them is part of the document. A material that shows textures is stored with them, as users save one.
 A stage is what things stand on: materials and shapes that it adds to a scene whose thing stands on the origin.
 `"builtin:NAME"` in it stands for an asset of `generated`.
 

@@ -40,6 +40,8 @@ def scene(kind: str, name: str) -> dict[str, Any]:
         }
     stage: dict[str, Any] = json.loads((FOLDER / "studio.json").read_text())
     stage["environment"] = presets.get("environments", "studio")
+    if "materials" in document:
+        (document,), stage["textures"] = document["materials"].values(), document["textures"]
     stage["materials"]["subject"] = document
     return stage
 

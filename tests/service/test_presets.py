@@ -20,7 +20,7 @@ from service.pack import pack
 from service.presets import latlong
 from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
-from service.scene import parse_scene
+from service.scene import check_saved_material, parse_scene
 from service.scene.material.disney import DisneyMaterial
 from service.scene.material.surface import Surface
 from tests.counting import python_lines
@@ -38,13 +38,22 @@ def among(kind: str, document: dict[str, Any]) -> dict[str, Any]:
         return document
     scene = presets.get("scenes", "sphere-on-floor")  # the first scene has a wall before a low sun
     if kind == "materials":
-        scene["materials"]["subject"] = document
+        scene["materials"]["subject"], scene["textures"] = dressed(document)
     elif kind == "stages":
         scene["materials"] |= document["materials"]
         scene["shapes"] += document["shapes"]
     else:
         scene["environment"] = document
     return scene
+
+
+def dressed(document: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A preset's material, and its textures, with which it is what users save."""
+    check_saved_material(document)
+    if "materials" not in document:
+        return document, {}
+    (material,) = document["materials"].values()
+    return material, document["textures"]
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
@@ -243,9 +252,11 @@ def test_every_material_renders(gpu: Renderer, store: AssetStore) -> None:
         {"type": "sphere", "center": [i % 4 - 1.5, i // 4 - 1.0, 0], "radius": 0.5, "material": name}
         for i, name in enumerate(names)
     ]
-    materials = {name: presets.get("materials", name) for name in names}
+    pairs = {name: dressed(presets.get("materials", name)) for name in names}
+    materials, textures = ({name: pair[k] for name, pair in pairs.items()} for k in (0, 1))
     environment = {"type": "constant", "radiance": 1}
     document = {"version": 1, "camera": CAMERA, "materials": materials, "shapes": row, "environment": environment}
+    document["textures"] = {name: each for shown in textures.values() for name, each in shown.items()}
     color = rendered(gpu, store, document)
     assert np.isfinite(color).all() and color[..., :3].min() > 0
 

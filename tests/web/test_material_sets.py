@@ -57,6 +57,21 @@ def test_textures_come_under_names_that_are_free(page: Page) -> None:
     assert old["lost"] == ["grain"] and set(old["material"]) == {"type", "base_color", "normal_map"}
 
 
+def test_what_a_ramp_reads_comes_along(page: Page) -> None:
+    noise, stops = {"type": "noise", "seed": 3}, [{"position": 0, "color": 0}, {"position": 1, "color": 1}]
+    ramp = {"type": "ramp", "input": {"texture": "veins"}, "stops": stops}
+    marble, scene = {"type": "diffuse", "albedo": {"texture": "color"}}, {"textures": {"veins": noise, "color": ramp}}
+    whole = call(page, SET, "carried", "marble", marble, scene)
+    assert whole["textures"] == scene["textures"]
+    own = {"textures": {"veins": GRAIN, "color": GRAIN}}
+    made = call(page, SET, "received", own, {"material": marble, **scene})
+    assert made["added"] == ["veins-2", "color-2"] and made["textures"]["veins-2"] == noise
+    assert made["textures"]["color-2"] == {**ramp, "input": {"texture": "veins-2"}}
+    assert made["material"]["albedo"]["texture"] == "color-2"
+    again = call(page, SET, "received", {"textures": made["textures"]}, {"material": marble, **scene})
+    assert again["added"] == []
+
+
 def shown(editor: Editor, material: str) -> dict[str, Any]:
     """The documents of the textures that a material shows, by parameter."""
     scene = document(editor)

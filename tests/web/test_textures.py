@@ -191,3 +191,25 @@ def test_a_materials_picture_shows_its_texture(editor: Editor) -> None:
 def shows(greens: list[float]) -> bool:
     most, least = greens
     return most > 40 and least < most / 2
+
+
+def test_a_ramp_over_noise_is_made_by_hand(editor: Editor) -> None:
+    page = editor.page
+    page.click("[data-field=base_color] button.image")
+    page.click(".tile[value=ramp]")
+    editor.wait("the ramp", lambda: page.is_visible(BENEATH))
+    page.click(f"{BENEATH} > summary")
+    editor.wait("its stops", lambda: page.locator(f"{BENEATH} [role=group]").count() == 2)
+    page.get_by_label("Input", exact=True).select_option("new noise")
+    octaves = page.locator(f"{BENEATH} [data-field=octaves] input.number")
+    octaves.fill("2")
+    octaves.press("Enter")
+    page.click(f"{BENEATH} button:has-text('Add a stop')")
+    editor.wait("a third stop", lambda: page.locator(f"{BENEATH} [role=group]").count() == 3)
+    page.get_by_role("button", name="Remove stop 1").click()
+    editor.wait("one less", lambda: page.locator(f"{BENEATH} [role=group]").count() == 2)
+    document = json.loads(editor.shot("#download-scene"))
+    ramp, noise = document["textures"]["ramp"], document["textures"]["noise"]
+    assert noise == {"type": "noise", "octaves": 2} and ramp["input"] == {"texture": "noise"}
+    assert [stop["position"] for stop in ramp["stops"]] == [0.5, 1]
+    assert editor.text("#messages") == ""

@@ -6,14 +6,23 @@ import { at, equal, isObject, put } from "../lib/patch.js";
 
 const shows = (value) => isObject(value) && typeof value.texture === "string";
 
-// The names of the textures that a material shows.
-export const texturesOf = (material) => [
+// The texture that a ramp reads, or undefined.
+const readBy = (texture) => texture?.input?.texture;
+
+// The names of the textures that a material shows, among `textures`, those that ramps read before the ramps.
+export const texturesOf = (material, textures = {}) => [
   ...new Set(
     Object.values(material)
       .filter(shows)
-      .map(({ texture }) => texture),
+      .flatMap(({ texture }) => [readBy(textures[texture]), texture].filter((name) => name !== undefined)),
   ),
 ];
+
+// A texture with other names, {old: new}, for what it reads.
+export const rewired = (texture, names) =>
+  Object.hasOwn(names, readBy(texture) ?? "")
+    ? { ...texture, input: { ...texture.input, texture: names[readBy(texture)] } }
+    : texture;
 
 // The material with other names for its textures, {old: new}.
 export const retextured = (material, names) =>
@@ -27,7 +36,7 @@ export const retextured = (material, names) =>
 
 // A material of a scene, ready to be carried away under this name.
 export function carried(name, material, { textures = {} }) {
-  const shown = texturesOf(material).filter((each) => Object.hasOwn(textures, each));
+  const shown = texturesOf(material, textures).filter((each) => Object.hasOwn(textures, each));
   if (!shown.length) return material;
   return {
     materials: { [name]: material },
@@ -50,9 +59,9 @@ export function received(scene, { material, textures: carriedOnes }) {
   const own = scene.textures ?? {};
   const all = { ...own };
   const names = {};
-  const shown = texturesOf(material);
+  const shown = texturesOf(material, carriedOnes);
   for (const name of shown.filter((each) => Object.hasOwn(carriedOnes, each))) {
-    const texture = carriedOnes[name];
+    const texture = rewired(carriedOnes[name], names);
     const isHere = (each) => Object.hasOwn(own, each) && equal(own[each], texture);
     names[name] = [name, ...Object.keys(own)].find(isHere) ?? fresh(name, all);
     all[names[name]] = texture;
@@ -86,7 +95,7 @@ export function withdrawn(state, { place, before, added, thing, was }) {
 
 // What the picture of a material depends on; the same as `before` where nothing of it is another object.
 export function pictured(material, { textures = {} }, before = []) {
-  const now = [material, ...texturesOf(material).map((name) => textures[name])];
+  const now = [material, ...texturesOf(material, textures).map((name) => textures[name])];
   return now.length === before.length && now.every((each, i) => each === before[i]) ? before : now;
 }
 

@@ -1,7 +1,7 @@
 // A scene that is added to another: its materials, textures and shapes under names that are free there.
 
 import { fresh } from "./materials.js";
-import { retextured } from "./material-set.js";
+import { retextured, rewired } from "./material-set.js";
 
 // Old names to new ones, none of which is taken.
 function names(documents, taken) {
@@ -18,15 +18,19 @@ function names(documents, taken) {
 const under = (documents, given) =>
   Object.fromEntries(Object.entries(documents).map(([name, document]) => [given[name], document]));
 
+const mapped = (documents, change) =>
+  Object.fromEntries(Object.entries(documents).map(([name, document]) => [name, change(document)]));
+
 // {textures, materials, shapes} of `other` as `scene` can take them over. Lights, camera and environment stay behind.
 export function adapted(other, scene) {
   const images = names(other.textures ?? {}, scene.textures ?? {});
   const given = names(other.materials, scene.materials);
-  const materials = Object.fromEntries(
-    Object.entries(other.materials).map(([name, material]) => [name, retextured(material, images)]),
-  );
+  const materials = mapped(other.materials, (material) => retextured(material, images));
   return {
-    textures: under(other.textures ?? {}, images),
+    textures: under(
+      mapped(other.textures ?? {}, (texture) => rewired(texture, images)),
+      images,
+    ),
     materials: under(materials, given),
     shapes: other.shapes.map((shape) => ({ ...shape, material: given[shape.material] })),
   };

@@ -3,7 +3,7 @@
 import { fresh } from "./materials.js";
 import { at, equal, isObject, put } from "../lib/patch.js";
 
-// The places of a checker's two values in a parameter's range: a contrast that shows, and no ends of a range.
+// The places of two values in a parameter's range: a contrast that shows, and no ends of a range.
 const LIGHT = 0.8;
 const DARK = 0.2;
 
@@ -29,16 +29,17 @@ export function pictured(state, place, asset, wanted) {
   return given(state, place, { ...(type ? {} : lying), asset }, wanted);
 }
 
-// With a checker of values that suit the parameter.
-export function checkered(state, place, { soft }) {
+// With a texture that is computed, of two values that suit the parameter: a checker, a noise, or a ramp along u.
+export function made(state, place, { soft }, type) {
   const low = Math.max(0, soft.min ?? 0);
   const high = Math.max(low, soft.max ?? 1);
   const [a, b] = [LIGHT, DARK].map((share) => Number((low + share * (high - low)).toPrecision(3)));
-  return given(state, place, { type: "checker", a, b }, "checker");
+  const stops = [b, a].map((color, position) => ({ position, color }));
+  return given(state, place, { type, ...(type === "ramp" ? { stops } : { a, b }) }, type);
 }
 
-// How many parameters of the scene's materials show a texture.
-export const users = ({ materials }, name) =>
-  Object.values(materials)
+// How many parameters of the scene's materials, and ramps, show a texture.
+export const users = ({ materials, textures = {} }, name) =>
+  [...Object.values(materials), ...Object.values(textures)]
     .flatMap(Object.values)
     .filter((value) => isObject(value) && value.texture === name).length;

@@ -1,14 +1,20 @@
-// The place for an image beside a parameter: a button that offers the scene's textures, a file or a checker, and a
+// The place for an image beside a parameter: a button that offers the scene's textures, a file or one that is computed, and a
 // chip with the texture's picture while there is one.
 
 import { element } from "../lib/dom.js";
 import { accepted, browse } from "../lib/files.js";
 import { isObject } from "../lib/patch.js";
-import { checkered, used, users } from "../document/textures.js";
+import { made, used, users } from "../document/textures.js";
 
 const ICON =
   "M2 3h12v10H2zm1.4 1.4v5.2l2.7-2.9 2.6 2.8 1.6-1.5 2.3 2.2V4.4zm7.3.9a1.1 1.1 0 1 1 0 2.2 1.1 1.1 0 0 1 0-2.2";
 const NAMED = "texture:";
+// What can be computed, with what it looks like.
+const MADE = {
+  checker: ["two values by turns", { a: 0.8, b: 0.2 }],
+  noise: ["clouds, grain, creases", {}],
+  ramp: ["colours along a line", { stops: [0.05, 0.8].map((color, position) => ({ position, color })) }],
+};
 
 function icon() {
   const [svg, path] = ["svg", "path"].map((tag) => document.createElementNS("http://www.w3.org/2000/svg", tag));
@@ -27,10 +33,10 @@ export const textureActs =
   ({ editor, importer, thumbnails }) =>
   (place, field) => ({
     scene: () => editor.state.scene,
-    paint: (canvas, texture) => thumbnails.paint(canvas, texture),
+    paint: (canvas, texture) => thumbnails.paint(canvas, texture, editor.state.scene.textures),
     useFile: (file) => importer.texture(place, file),
     useTexture: (name) => editor.change(used(editor.state, place, name)),
-    makeChecker: () => editor.change(checkered(editor.state, place, field)),
+    make: (type) => editor.change(made(editor.state, place, field, type)),
   });
 
 // `acts` as textureActs makes them for this parameter, and `remove()`.
@@ -116,8 +122,11 @@ export class TextureSlot {
         canvas,
       );
     });
-    const checker = element("canvas", { class: "thumb", "aria-hidden": "true" });
-    acts.paint(checker, { type: "checker", a: 0.8, b: 0.2 });
+    const computed = Object.entries(MADE).map(([type, [note, looks]]) => {
+      const canvas = element("canvas", { class: "thumb", "aria-hidden": "true" });
+      acts.paint(canvas, { type, ...looks });
+      return this.#tile(type, `New ${type}`, note, canvas);
+    });
     const chosen = await question({
       title: `Image for ${field.title}`,
       body: [
@@ -130,9 +139,7 @@ export class TextureSlot {
             "PNG, JPEG, WebP, EXR, HDR",
             element("span", { class: "thumb sign" }, icon()),
           ),
-          ...(field.widget === "texture"
-            ? []
-            : [this.#tile("checker", "New checker", "two values by turns", checker)]),
+          ...(field.widget === "texture" ? [] : computed),
           ...textures,
         ),
       ],
@@ -140,7 +147,7 @@ export class TextureSlot {
     if (chosen === "browse") {
       const [file] = await browse(accepted(["image", "light"]));
       if (file) await acts.useFile(file);
-    } else if (chosen === "checker") acts.makeChecker();
+    } else if (Object.hasOwn(MADE, chosen ?? "")) acts.make(chosen);
     else if (chosen !== null) acts.useTexture(chosen.slice(NAMED.length));
     // The button that asked is hidden now, if there is a texture: the keyboard goes on from the chip.
     if (document.activeElement === document.body) this.change.focus();

@@ -6,13 +6,14 @@ import { hex, linear } from "../lib/color.js";
 
 const SIDE = 64;
 const SQUARES = 4; // of a checker, along each side
+const PAUSE_MS = 300; // for which a texture that is computed must have stayed as it is before its picture is rendered
 const MEAN_SAMPLES = 16; // of a pixel, which spread evenly over it
 
 // A square of a black material that shines as the image tells, and fills the picture.
-const lit = (black, texture, looks = { emission: { texture: "image" } }) => ({
+const lit = (black, texture, { looks = { emission: { texture: "image" } }, textures = {} } = {}) => ({
   version: 1,
   camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 },
-  textures: { image: texture },
+  textures: { ...textures, image: texture },
   materials: { image: { ...black, ...looks } },
   shapes: [{ type: "quad", origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0], material: "image" }],
 });
@@ -20,8 +21,14 @@ const lit = (black, texture, looks = { emission: { texture: "image" } }) => ({
 const OPACITY = { emission: 1, alpha: { texture: "image", channel: "a" } };
 const SETTINGS = { width: SIDE, height: SIDE, max_bounces: 0, filter: "box" };
 
-const rendered = async (black, asset) =>
-  createImageBitmap(await renderPicture(lit(black, { asset }), { ...SETTINGS, max_samples: 4 }));
+const rendered = async (black, texture, textures = {}) =>
+  createImageBitmap(await renderPicture(lit(black, texture, { textures }), { ...SETTINGS, max_samples: 4 }));
+
+// What a texture that is computed reads besides its own numbers: the input of a ramp, as a table of textures.
+function inputOf({ input }, textures = {}) {
+  const name = input?.texture;
+  return name !== undefined && textures[name] ? { [name]: textures[name] } : {};
+}
 
 // The mean colour of a square's picture, whose pixels are single-precision numbers behind the header of a .npy file.
 async function meanOf(scene) {
@@ -63,7 +70,7 @@ export class TextureThumbnails {
     this.#bitmaps.set(
       asset,
       shrink(file)
-        .catch(() => rendered(this.black, asset))
+        .catch(() => rendered(this.black, { asset }))
         .catch(() => null),
     );
   }
@@ -72,7 +79,7 @@ export class TextureThumbnails {
     if (!this.#bitmaps.has(asset)) {
       const made = this.#last.then(async () => {
         try {
-          return await shrink(await fetchAsset(asset)).catch(() => rendered(this.black, asset));
+          return await shrink(await fetchAsset(asset)).catch(() => rendered(this.black, { asset }));
         } catch {
           return null; // without a picture the name has to do
         }
@@ -86,10 +93,21 @@ export class TextureThumbnails {
   // Resolves to the texture's mean, linear [r, g, b, a]; of an image that the service cannot read 1. `reads` is "color" or
   // a channel: images of 8 bits are sRGB where a colour is read, unless they say otherwise. Only alpha has a mean where
   // that is read, as an image without it cannot be asked for it.
-  async mean(texture, reads) {
+  async mean(texture, reads, textures = {}) {
     if (texture.type === "checker") {
       const [a, b] = [linear(texture.a), linear(texture.b)];
       return [...a.map((x, i) => (x + b[i]) / 2), 1];
+    }
+    if (texture.type) {
+      const inner = inputOf(texture, textures);
+      const key = JSON.stringify([texture, inner]);
+      const make = () => meanOf(lit(this.black, texture, { textures: inner })).then((color) => [...color, 1]);
+      if (!this.#means.has(key))
+        this.#means.set(
+          key,
+          make().catch(() => [1, 1, 1, 1]),
+        );
+      return this.#means.get(key);
     }
     const { asset, color_space = reads === "color" ? undefined : "linear" } = texture;
     const key = JSON.stringify([asset, color_space, reads === "a"]);
@@ -97,7 +115,7 @@ export class TextureThumbnails {
       const image = { asset, ...(color_space ? { color_space } : {}) };
       const made =
         reads === "a"
-          ? meanOf(lit(this.black, image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity])
+          ? meanOf(lit(this.black, image, { looks: OPACITY })).then(([opacity]) => [1, 1, 1, opacity])
           : meanOf(lit(this.black, image)).then((color) => [...color, 1]);
       this.#means.set(
         key,
@@ -107,15 +125,31 @@ export class TextureThumbnails {
     return this.#means.get(key);
   }
 
+  // Resolves to the picture of a texture that is computed, or null where it becomes another one meanwhile.
+  async #computed(wanted, canvas, texture, inner) {
+    if (!this.#bitmaps.has(wanted)) {
+      await new Promise((done) => setTimeout(done, PAUSE_MS));
+      if (canvas.dataset.shown !== wanted) return null;
+    }
+    if (!this.#bitmaps.has(wanted)) {
+      const made = this.#last.then(() => rendered(this.black, texture, inner)).catch(() => null);
+      this.#last = made;
+      this.#bitmaps.set(wanted, made);
+    }
+    return this.#bitmaps.get(wanted);
+  }
+
   // A canvas that shows the texture, now or as soon as there is a picture of it.
-  paint(canvas, texture) {
-    const wanted = JSON.stringify([texture.asset, texture.a, texture.b]);
+  paint(canvas, texture, textures = {}) {
+    const inner = inputOf(texture, textures);
+    const wanted = JSON.stringify(texture.type ? [texture, inner] : [texture.asset]);
     if (canvas.dataset.shown === wanted) return;
     Object.assign(canvas, { width: SIDE, height: SIDE });
     canvas.dataset.shown = wanted;
     const context = canvas.getContext("2d");
     if (texture.type === "checker") return drawChecker(context, texture);
-    this.#bitmap(texture.asset).then((bitmap) => {
+    const found = texture.type ? this.#computed(wanted, canvas, texture, inner) : this.#bitmap(texture.asset);
+    found.then((bitmap) => {
       if (bitmap && canvas.dataset.shown === wanted) drawImage(context, bitmap);
     });
   }

@@ -41,15 +41,35 @@ export class TextureForm {
         this.#part(textureModel(this.schema, texture), pointer("scene", "textures", value.texture)),
       ];
       this.body.replaceChildren(...this.parts.map((part) => part.element));
+      if (texture.type === "ramp") this.#ramp(value.texture);
     }
-    for (const { place, show } of this.parts) show(at(this.acts.state, place) ?? {});
+    for (const part of this.parts) part.show(at(this.acts.state, part.place) ?? {});
     const count = users(scene, value.texture);
     this.shared.hidden = count < 2;
     this.shared.textContent = `How it lies holds for all ${count} parameters that show ${value.texture}.`;
   }
 
+  // What a ramp reads, and its stops: a form of its own, loaded for the first ramp.
+  async #ramp(name) {
+    const { parts } = this;
+    const { RampForm } = await import("./ramp-form.js");
+    if (parts !== this.parts) return;
+    const place = pointer("scene", "textures", name);
+    const form = new RampForm({
+      schema: this.schema,
+      place,
+      acts: this.acts,
+      part: (model, at) => this.#part(model, at),
+    });
+    parts.push(form);
+    this.body.append(form.element);
+    form.show(at(this.acts.state, place) ?? {});
+  }
+
+  // A form for the members of a model but for `input`, which the form of a ramp has.
   #part(model, place) {
-    const form = schemaForm(fields(this.schema, model), {
+    const own = fields(this.schema, model).filter(({ name }) => name !== "input");
+    const form = schemaForm(own, {
       change: (name, value) => this.acts.edit(`${place}/${name}`, value),
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),

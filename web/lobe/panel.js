@@ -246,7 +246,7 @@ export class LobePanel {
       const key = JSON.stringify([textures[texture], reads]);
       if (this.#means.has(key) || !textures[texture]) continue;
       this.#means.set(key, null);
-      this.mean(textures[texture], reads).then((mean) => {
+      this.mean(textures[texture], reads, textures).then((mean) => {
         this.#means.set(key, mean);
         this.refresh();
       });

@@ -161,7 +161,12 @@ class View(anywidget.AnyWidget):
         if kind == "environments":
             document = {**scene, "environment": document}
         elif kind == "materials":
+            shown = document.get("textures", {})
+            if "materials" in document:  # one that comes with its textures
+                (document,) = document["materials"].values()
             document = {**scene, "materials": {**scene["materials"], self.material: document}}
+            if shown:
+                document["textures"] = {**scene.get("textures", {}), **shown}
         if (patch := difference(scene, document)) is not None:
             post(self._edited(patch))
             self._accept(document)
