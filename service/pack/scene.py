@@ -201,7 +201,8 @@ def _geometry(
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
     materials = ShapeMaterials(names, shining, required_charts(scene), height_fields(scene, assets))
-    if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
+    files = [*scene.shapes, *(height.texture for height in materials.heights.values())]
+    if cache is None or not all(lasting(getattr(each, "asset", None)) for each in files):
         return assemble(scene.shapes, materials, assets, room)
     contents = tuple(map(content, scene.shapes))
     apart = cache.moves.apart(scene.shapes, contents, lambda shape: triangles(shape, assets))

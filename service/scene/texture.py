@@ -129,7 +129,7 @@ class HeightTexture(_Reference):
 
     channel: Annotated[Channel, hint("Channel", "Which of the texture's channels is read.")] = "r"
     scale: Annotated[
-        Coordinate, hint("Scale", "How far white lies above black; below 0 white is deep.",
+        Coordinate, hint("Relief", "How far white lies above black; below 0 white is deep.",
                          unit="m", widget="slider", soft=(0, 0.1))
     ] = 0.02  # fmt: skip
     midlevel: Annotated[

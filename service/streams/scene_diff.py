@@ -42,7 +42,13 @@ def _number(scene: Scene) -> int:
 def _asked(scene: Scene) -> list[object]:
     """The demands on textures and meshes that these could turn out not to meet."""
     sets = [[getattr(t, name, None) for name in ("uv", "space", "input")] for t in scene.textures.values()]
-    return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes]]
+    cut = [(shape.max_edge, shape.transform) for shape in _displaced(scene)]
+    return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes], cut]
+
+
+def _displaced(scene: Scene) -> list[MeshShape]:
+    """The meshes that heights move."""
+    return [shape for shape in scene.shapes if isinstance(shape, MeshShape) and shape.displacement]
 
 
 def _skeleton(scene: Scene) -> tuple[object, ...]:
@@ -52,7 +58,7 @@ def _skeleton(scene: Scene) -> tuple[object, ...]:
     which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents. An ambient
     term counts where it is blinding. Heights that move a mesh decide where its triangles are.
     """
-    displaced = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape) and shape.displacement}
+    displaced = {shape.material for shape in _displaced(scene)}
     on_meshes = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape)}
     materials = [
         (

@@ -20,7 +20,7 @@ from service.problems import FieldError, InvalidDocument
 
 PARTS = 200  # of a mesh's size is the longest edge where the document gives none
 # Triangles of a mesh are this times its area over the square of the longest edge, at most: edges are cut in halves.
-DENSITY = 10.0
+DENSITY = 20.0
 
 
 @dataclass(frozen=True)

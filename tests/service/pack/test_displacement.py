@@ -9,8 +9,10 @@ import pytest
 import trimesh
 
 from service.pack import pack
+from service.pack.edits.cache import PackCache
 from service.problems import InvalidDocument
-from service.scene import parse_scene
+from service.scene import Scene, parse_scene
+from service.streams.scene_diff import scene_diff
 from tests.documents import CUBE, Few, Shelf, document, mesh, picture, refused
 
 N = 16
@@ -81,6 +83,19 @@ def test_what_has_no_room_is_refused_and_told_what_has() -> None:
     assert 200 < len(triangles(mesh(**PLANE, max_edge=would_do), limits=Few(1000))) <= 1000
     few = triangles(mesh(**PLANE))  # as the mesh's size wants it
     assert 10_000 < len(few) < 200_000
+
+
+def test_an_edit_of_the_height_moves_the_mesh_again() -> None:
+    cache, shelf = PackCache(), Shelf(t=RAMP)
+
+    def scene(scale: float) -> Scene:
+        material = {"type": "diffuse", "albedo": 0.5, "height": {"texture": "t", "scale": scale}}
+        return parse_scene(document(mesh(**PLANE, max_edge=0.5, material="m", displacement=True),
+                                    materials={"m": material}, textures={"t": {"asset": "sha256:t"}}))  # fmt: skip
+
+    low, same, high = (pack(scene(scale), shelf, cache).arrays.triangles for scale in (0.1, 0.1, 0.2))
+    assert same is low and np.ptp(high["v0"][:, 2]) == pytest.approx(2 * np.ptp(low["v0"][:, 2]), rel=1e-4)
+    assert scene_diff(scene(0.1), scene(0.2)).whole
 
 
 def test_what_is_computed_moves_no_mesh() -> None:
