@@ -8,7 +8,7 @@ from service.assets.formats import COMPRESSIONS, KINDS, missing
 from service.images import animation
 from service.views import FileFormat
 
-READ = {"meshes": "mesh", "scenes": "scene", "images": "image"}  # names of lists, by the kind of asset
+READ = {"meshes": "mesh", "scenes": "scene", "images": "image", "luts": "lut"}  # names of lists, by the kind of asset
 
 
 def told() -> dict[str, Any]:

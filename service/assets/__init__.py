@@ -26,6 +26,9 @@ scenes        parts that the importers of whole scenes share
 
 from service.assets.local_files import FileAssets
 from service.assets.store import AssetStore
-from service.assets.types import AssetInfo, AssetLimits, Assets, ImageData, MeshData, MeshOddities
+from service.assets.types import AssetInfo, AssetLimits, Assets, ImageData, LutData, MeshData, MeshOddities
 
-__all__ = ["AssetInfo", "AssetLimits", "AssetStore", "Assets", "FileAssets", "ImageData", "MeshData", "MeshOddities"]
+__all__ = [
+    "AssetInfo", "AssetLimits", "AssetStore", "Assets", "FileAssets", "ImageData", "LutData", "MeshData",
+    "MeshOddities",
+]  # fmt: skip

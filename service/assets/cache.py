@@ -4,15 +4,17 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Protocol
 
 import numpy as np
 
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.sandbox import Sandbox
-from service.assets.types import AssetLimits, ImageData, MeshData
+from service.assets.types import AssetLimits, Assets, ImageData, LutData, MeshData
 from service.problems import AssetError, NotProvided
 
-Parsed = MeshData | ImageData
+Parsed = MeshData | ImageData | LutData
+NOUNS = {MeshData: "a mesh", ImageData: "an image", LutData: "a table of colours"}
 
 
 class ParsedCache:
@@ -88,13 +90,26 @@ class ParsedCache:
 
 def as_mesh(parsed: Parsed, name: str) -> MeshData:
     if not isinstance(parsed, MeshData):
-        raise AssetError(f"{name} is an image; a mesh is needed here")
+        raise AssetError(f"{name} is {NOUNS[type(parsed)]}; a mesh is needed here")
     return parsed
 
 
 def as_image(parsed: Parsed, name: str) -> ImageData:
     if not isinstance(parsed, ImageData):
-        raise AssetError(f"{name} is a mesh; an image is needed here")
+        raise AssetError(f"{name} is {NOUNS[type(parsed)]}; an image is needed here")
+    return parsed
+
+
+class AnyAssets(Assets, Protocol):
+    """Assets of every kind, those that views refer to as well."""
+
+    def load(self, ref: str) -> Parsed:
+        """Raises AssetError."""
+
+
+def as_lut(parsed: Parsed, name: str) -> LutData:
+    if not isinstance(parsed, LutData):
+        raise AssetError(f"{name} is {NOUNS[type(parsed)]}; a table of colours (.cube) is needed here")
     return parsed
 
 

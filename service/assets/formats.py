@@ -30,6 +30,7 @@ KINDS: dict[str, Kind] = {
     "png": "image",
     "jpeg": "image",
     "webp": "image",
+    "cube": "lut",
 }
 
 MAGIC = (
@@ -71,6 +72,9 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
+CUBE_START = re.compile(
+    rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:TITLE|LUT_[13]D_SIZE|LUT_[13]D_INPUT_RANGE|DOMAIN_MIN|DOMAIN_MAX)[ \t]"
+)
 STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
 # After what XML has before its root; possessive for the same reason.
@@ -112,6 +116,8 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
         return "gltf"
     if MTLX_TEXT.match(words):
         return "mtlx"
+    if CUBE_START.match(words):
+        return "cube"
     if OBJ_START.match(words):
         return "obj"
     named = (content_type or "").partition(";")[0].strip().lower()

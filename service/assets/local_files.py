@@ -7,11 +7,11 @@ import stat
 from pathlib import Path
 from types import TracebackType
 
-from service.assets.cache import Parsed, ParsedCache, as_image, as_mesh, refused
+from service.assets.cache import Parsed, ParsedCache, as_image, as_lut, as_mesh, refused
 from service.assets.errors import ParseError
 from service.assets.source import format_of
 from service.assets.store import AssetStore
-from service.assets.types import AssetLimits, ImageData, MeshData
+from service.assets.types import AssetLimits, ImageData, LutData, MeshData
 from service.problems import AssetError
 
 
@@ -37,6 +37,12 @@ class FileAssets:
         if ref.startswith("sha256:"):
             return self._store(ref).image(ref)
         return as_image(self._load(ref), repr(ref))
+
+    def lut(self, ref: str) -> LutData:
+        """Raises AssetError."""
+        if ref.startswith("sha256:"):
+            return as_lut(self._store(ref).load(ref), ref)
+        return as_lut(self._load(ref), repr(ref))
 
     def read(self, ref: str) -> bytes:
         """The bytes of a file. Raises AssetError."""

@@ -33,8 +33,13 @@ ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
     "make materials by their names; MaterialX; "
-    "EXR, Radiance HDR, PNG, JPEG and WebP images"
+    "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours"
 )
+NO_SCENES: dict[Kind, str] = {
+    "image": "is an image",
+    "materials": "holds materials",
+    "lut": "is a table of colours",
+}
 TAKEN_APART: tuple[Kind, ...] = ("scene", "materials")  # kinds of files whose parts are assets of their own
 RECORD_BYTES = 512  # about the size of an asset's record
 
@@ -107,8 +112,8 @@ class AssetStore:
         Raises NotFound, AssetError, Unavailable.
         """
         info = self.info(id)
-        if info.kind in ("image", "materials"):
-            what = "is an image" if info.kind == "image" else "holds materials"
+        if info.kind in NO_SCENES:
+            what = NO_SCENES[info.kind]
             raise NotFound(f"{id[:100]} {what}: only meshes and scene files can be shown as a scene")
         if info.kind == "mesh":
             document, remark = plain_scene(id, self.mesh(id))
@@ -176,11 +181,11 @@ class AssetStore:
 
     def mesh(self, ref: str) -> MeshData:
         """A mesh by its reference. Raises AssetError."""
-        return as_mesh(self._load(ref), ref)
+        return as_mesh(self.load(ref), ref)
 
     def image(self, ref: str) -> ImageData:
         """An image by its reference. Raises AssetError."""
-        return as_image(self._load(ref), ref)
+        return as_image(self.load(ref), ref)
 
     def start(self) -> None:
         """Start a parsing process, without waiting, so that a first file is parsed at once."""
@@ -267,7 +272,8 @@ class AssetStore:
             log.error("could not store an asset", {"id": id, "error": error})
             raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
-    def _load(self, ref: str) -> Parsed:
+    def load(self, ref: str) -> Parsed:
+        """An asset of any kind by its reference. Raises AssetError."""
         if not ID.fullmatch(ref):
             raise AssetError(f"{ref[:100]!r} is not the id of an asset, `sha256:` and 64 hexadecimal digits")
         known = self._known(ref)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
-Kind = Literal["mesh", "image", "scene", "materials"]
+Kind = Literal["mesh", "image", "scene", "materials", "lut"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,16 @@ class ImageData:
     def is_8bit(self) -> bool:
         """Whether the texels are bytes as the file has them, not floats."""
         return self.pixels.dtype == np.uint8
+
+
+@dataclass(frozen=True)
+class LutData:
+    """A table from displayed colours to displayed colours, even over its domain. The array is read-only."""
+
+    values: Floats  # (n, 3), a curve for each channel; or (n, n, n, 3), by blue, green and red; finite
+    low: tuple[float, float, float]  # where the domain begins and ends
+    high: tuple[float, float, float]
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import hashlib
 import logging
 from typing import Any
 
-from service.assets import AssetStore, FileAssets, ImageData, MeshData
+from service.assets import AssetStore, FileAssets, ImageData, LutData, MeshData
 from service.problems import AssetError, NotFound, ServiceError
 from service.scene import references
 
@@ -29,16 +29,29 @@ class SourceAssets:
         """Raises AssetError."""
         return self._found.image(self._where(ref))
 
+    def lut(self, ref: str) -> tuple[str, LutData]:
+        """A table of colours and its id. It is copied into the data folder, so that its picture can be made again.
+        Raises AssetError."""
+        where = self._where(ref)
+        found = self._found.lut(where)
+        if where.startswith("sha256:"):
+            return where, found
+        self._keep(where)
+        return _id(self._found.read(where)), found
+
+    def _keep(self, ref: str) -> None:
+        try:
+            self._found.add(ref)
+        except (ServiceError, OSError) as error:  # another user's folder may not even be listed
+            log.warning("asset not kept", {"ref": ref, "error": error})
+
     def keep(self, scene: Any) -> None:
         """Copy the files that a document refers to into the data folder, so that its picture can be made again
         without them. Where there is no room, they stay needed.
         """
         for ref in references.references(scene):
             if not ref.startswith("sha256:"):
-                try:
-                    self._found.add(ref)
-                except (ServiceError, OSError) as error:  # another user's folder may not even be listed
-                    log.warning("asset not kept", {"ref": ref, "error": error})
+                self._keep(ref)
 
     def by_id(self, scene: Any) -> tuple[Any, dict[str, str]]:
         """The document with ids in the place of paths, and the paths by id."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from service.commands.tracing import Interrupt, Tracing
 from service.config import Config, load_config
 from service.displays import SRGB
 from service.images.recipe import PictureView, write
-from service.ipc.messages import View
+from service.ipc.messages import Lut, View
 from service.pack import pack
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError, problem
 from service.quality import resolve
@@ -68,24 +68,41 @@ class LocalRenderer:
             tracing.run(interrupt or Interrupt())
         except GpuError as error:
             raise Internal(str(error)) from None
-        return LocalPicture(tracing, tracing.status(setup_s), identified, names)
+
+        def lut(ref: str) -> Lut:
+            with source_assets(source, [], self._config) as assets:
+                id, found = assets.lut(ref)
+            return Lut(id, found.values, found.low, found.high)
+
+        return LocalPicture(tracing, tracing.status(setup_s), identified, names, lut)
 
 
 class LocalPicture:
     """A picture whose samples lie on the GPU until `close`. `status` as `GET /v1/renders/{id}` would answer."""
 
-    def __init__(self, tracing: Tracing, status: dict[str, Any], document: Any, names: dict[str, str]) -> None:
-        self._tracing, self._document, self._names = tracing, document, names
+    def __init__(
+        self,
+        tracing: Tracing,
+        status: dict[str, Any],
+        document: Any,
+        names: dict[str, str],
+        lut: Callable[[str], Lut],
+    ) -> None:
+        """`lut` reads the table of colours that a view names."""
+        self._tracing, self._document, self._names, self._lut = tracing, document, names, lut
         self.status = status
 
     def encoded(self, format: FileFormat, view: Mapping[str, Any]) -> bytes:
-        """A file; `view`: aov, bits, exposure, tone_map, color_space. Raises InvalidDocument."""
+        """A file; `view`: aov, bits, exposure, tone_map, color_space, lut. Raises InvalidDocument."""
         row = images.FORMATS.get(format)
         if row is None:
             raise InvalidDocument(
                 [FieldError("/format", f"must be one of {', '.join(images.FORMATS)}, not {format!r}")]
             )
         look = validated(_VIEW, dict(view), "")
+        lut = self._lut(look.lut) if look.lut is not None else None
+        if lut is not None:
+            look = look.model_copy(update={"lut": lut.key})
         made_from = None
         if row.has_metadata:
             made_from = write(
@@ -98,7 +115,7 @@ class LocalPicture:
             return images.encode_layers(layers, made_from)
         stands = shown_as(look.tone_map, look.color_space, format) if look.aov == "color" else SRGB
         p3 = look.color_space == "display_p3"
-        pixels = self._tracing.pixels(View(look.aov, look.exposure, look.tone_map, row.encoding(look.bits), p3))
+        pixels = self._tracing.pixels(View(look.aov, look.exposure, look.tone_map, row.encoding(look.bits), p3, lut))
         return images.encode(pixels, format, bits=look.bits, metadata=made_from, encoding=stands)
 
     def close(self) -> None:

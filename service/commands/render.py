@@ -10,7 +10,7 @@ import json
 import math
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +29,10 @@ from service.commands.documents import (
 from service.views import AOVS, COLOR_SPACES, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
 
 if TYPE_CHECKING:
+    from service.commands.assets import SourceAssets
     from service.commands.tracing import Tracing
     from service.images.recipe import PictureView
+    from service.ipc.messages import Lut
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         packed = pack_scene(source, assets, config)
         with refusals():
             document, names = assets.by_id(source.document) if output.is_repeatable else (None, {})
+            output, lut = _with_lut(output, assets)
         from gpu import GpuError
         from service.commands.tracing import Interrupt, Tracing
         from service.quality import resolve
@@ -79,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
                 tracing = Tracing(renderer, packed, resolve(chosen))
                 setup_s = time.perf_counter() - began
                 tracing.run(interrupt)
-                files.write(output.path, _encode(tracing, output, document, names))
+                files.write(output.path, _encode(tracing, output, document, names, lut))
                 tracing.close()
         except GpuError as error:
             raise Failed(str(error)) from None
@@ -129,6 +132,7 @@ def _view(
         "exposure": exposure,
         "tone_map": arguments.tone_map,
         "color_space": arguments.color_space,
+        "lut": arguments.lut,
     }
     given = {name: value for name, value in options.items() if value is not None}
     view = (before or PictureView()).model_copy(update=given)
@@ -160,7 +164,18 @@ def _choose(option: str, value: str, known: tuple[str, ...]) -> None:
         raise BadInput(f"{option} {value!r}: is not one of {', '.join(known)}")
 
 
-def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, str]) -> bytes:
+def _with_lut(output: Output, assets: SourceAssets) -> tuple[Output, Lut | None]:
+    """The output, which names its table of colours by id, and the table."""
+    from service.ipc.messages import Lut
+
+    if output.view.lut is None or output.format != "png":
+        return output, None
+    id, found = assets.lut(output.view.lut)
+    named = replace(output, view=output.view.model_copy(update={"lut": id}))
+    return named, Lut(id, found.values, found.low, found.high)
+
+
+def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, str], lut: Lut | None) -> bytes:
     from service import images
     from service.images import recipe
     from service.ipc.messages import View
@@ -172,6 +187,6 @@ def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, st
         return images.encode_layers({aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from)
     encoding = images.FORMATS[output.format].encoding(view.bits)
     p3 = view.color_space == "display_p3"
-    pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding, p3))
+    pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding, p3, lut))
     stands = displays.encoding_of(view.tone_map, p3) if view.aov == "color" else displays.SRGB
     return images.encode(pixels, output.format, bits=view.bits, metadata=made_from, encoding=stands)

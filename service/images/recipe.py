@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings
 from service.scene.base import Model
-from service.scene.look import ToneMap
+from service.scene.look import Lut, ToneMap
 from service.scene.validation import validated
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits, ColorSpace
 
@@ -25,6 +25,10 @@ class PictureView(Model):
     tone_map: ToneMap = DEFAULT_TONE_MAP
     bits: Bits = 8
     color_space: ColorSpace = "srgb"
+    lut: Lut = None
+
+
+RARE = {"color_space": "srgb", "lut": None}  # fields that are written where they differ from this
 
 
 class _Recipe(Model):
@@ -58,7 +62,7 @@ def write(
         "scene": scene,
         "settings": settings.again(samples),
         "samples": samples,
-        "view": view.model_dump(exclude={"color_space"} if view.color_space == "srgb" else None),
+        "view": {name: value for name, value in view.model_dump().items() if value != RARE.get(name)},
     }
     return written | {"assets": assets} if assets else written
 

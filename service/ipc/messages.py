@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -47,6 +47,16 @@ class StopRule:
 
 
 @dataclass(frozen=True)
+class Lut:
+    """A table of displayed colours, as gpu.Lut has it. `key` is equal where the tables are."""
+
+    key: str
+    values: np.ndarray = field(compare=False)
+    low: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    high: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
 class View:
     """How a picture is to be shown; changing it costs no samples."""
 
@@ -55,6 +65,7 @@ class View:
     tone_map: str = DEFAULT_TONE_MAP
     encoding: Encoding = "u1"
     p3: bool = False  # for a screen with the primaries of Display P3
+    lut: Lut | None = None  # what is displayed goes through it last
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from service.assets import Assets
+from service.assets.cache import AnyAssets, as_lut
 from service.config import Config
-from service.ipc.messages import StopRule
+from service.ipc.messages import Lut, StopRule
 from service.pack import CacheBudget, PackCache, Packed, pack
-from service.problems import InvalidDocument
+from service.problems import AssetError, FieldError, InvalidDocument, NotFound
 from service.quality import ResolvedSettings
 from service.requests.request_parser import RequestParser
 from service.scene import Scene
@@ -23,7 +23,7 @@ class RequestReader(RequestParser):
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
     def __init__(
-        self, config: Config, assets: Assets, memory: MemoryBudget | None = None, access: AssetAccess | None = None
+        self, config: Config, assets: AnyAssets, memory: MemoryBudget | None = None, access: AssetAccess | None = None
     ) -> None:
         """`access` says which assets an owner may use; without it each may use all."""
         super().__init__(config)
@@ -42,6 +42,16 @@ class RequestReader(RequestParser):
         assets = self._assets if self._access is None else self._access.view(owner, scene)
         with _under("/scene"):
             return pack(scene, assets, cache, self._config, self._environments)
+
+    def lut(self, id: str, owner: str = "") -> Lut:
+        """A table of displayed colours, which `owner` may use. Raises InvalidDocument."""
+        try:
+            if self._access is not None:
+                self._access.check(owner, id)
+            found = as_lut(self._assets.load(id), id)
+        except (AssetError, NotFound) as error:
+            raise InvalidDocument([FieldError("/lut", error.detail)]) from None
+        return Lut(id, found.values, found.low, found.high)
 
 
 def stop_rule(settings: ResolvedSettings) -> StopRule:

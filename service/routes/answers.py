@@ -89,6 +89,7 @@ class Formats(BaseModel):
     meshes: list[str] = Field(description="Are read.")
     scenes: list[str] = Field(description="Are read as whole scenes.")
     images: list[str] = Field(description="Are read, for textures and environments.")
+    luts: list[str] = Field(description="Are read as tables of colours, which `lut` names.")
     materials: list[str] = Field(description="Are read as materials.")
     compressions: list[str] = Field(description="Are read inside glTF files.")
     missing: dict[str, str] = Field(description="Formats that this server lacks a package for, with its name.")

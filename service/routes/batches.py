@@ -25,9 +25,9 @@ from service.requests.batch_request import ParsedBatch
 from service.routes import answers, batch_files, waiting
 from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
-from service.routes.renders import IdempotencyHeader, ImageQuery, Wait
+from service.routes.renders import IdempotencyHeader, ImageQuery, Wait, lut_of
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
-from service.scene.look import ToneMap, shown_as
+from service.scene.look import Lut, ToneMap, shown_as
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE
 
@@ -45,12 +45,14 @@ class Shown(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
     tone_map: ToneMap = DEFAULT_TONE_MAP
+    lut: Lut = None
 
-    def view(self) -> View:
+    async def view(self, request: Request) -> View:
+        """Raises InvalidDocument."""
         if shown_as(self.tone_map, "srgb") != SRGB:
             detail = "names another display than sRGB's, for which sheets and animations are"
             raise InvalidDocument([FieldError("/tone_map", detail)])
-        return View("color", self.exposure, self.tone_map, "u1")
+        return View("color", self.exposure, self.tone_map, "u1", lut=await lut_of(request, self.lut))
 
 
 class SheetQuery(Shown):
@@ -166,6 +168,7 @@ async def delete(request: Request, id: BatchId) -> None:
 )
 async def images_zip(request: Request, id: BatchId, query: Annotated[ImageQuery, Query()]) -> Response:
     query.view()
+    await lut_of(request, query.lut)
     batch = app_state(request).batches.get(id, owner_of(request))
     return batch_files.zipped(request, batch, query, _pictured(batch))
 
@@ -180,7 +183,8 @@ async def images_zip(request: Request, id: BatchId, query: Annotated[ImageQuery,
 )
 async def sheet(request: Request, id: BatchId, query: Annotated[SheetQuery, Query()]) -> Response:
     batch = app_state(request).batches.get(id, owner_of(request))
-    return await batch_files.sheet(request, batch, query.format, query.width, query.view(), _pictured(batch))
+    view = await query.view(request)
+    return await batch_files.sheet(request, batch, query.format, query.width, view, _pictured(batch))
 
 
 @router.get(
@@ -192,7 +196,7 @@ async def sheet(request: Request, id: BatchId, query: Annotated[SheetQuery, Quer
 )
 async def animated(request: Request, id: BatchId, query: Annotated[AnimationQuery, Query()]) -> Response:
     batch = app_state(request).batches.get(id, owner_of(request))
-    steps, view = _pictured(batch), query.view()
+    steps, view = _pictured(batch), await query.view(request)
     return await batch_files.animated(request, batch, query.format, query.fps, query.width, view, steps)
 
 

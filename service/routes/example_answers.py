@@ -65,6 +65,7 @@ INFO: dict[str, Any] = {
         "meshes": ["obj", "ply", "stl"],
         "scenes": ["glb", "gltf", "zip"],
         "images": ["png", "exr", "hdr"],
+        "luts": ["cube"],
         "materials": ["zip"],
         "compressions": ["draco", "meshopt"],
         "missing": {"ktx2": "opengl-basisu"},

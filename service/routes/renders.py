@@ -20,6 +20,7 @@ from service import images, views
 from service.displays import SRGB
 from service.http.downloads import Downloads, FileAnswer, Written, present
 from service.images import recipe
+from service.ipc import messages
 from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.renders.job import Job
@@ -27,9 +28,9 @@ from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
-from service.scene.look import ToneMap, shown_as
+from service.scene.look import Lut, ToneMap, shown_as
 from service.state import MOST_WAITS, app_state, caller_of, owner_of
-from service.system.executors import writing
+from service.system.executors import storing, writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat
 
 router = APIRouter(prefix="/v1", tags=["renders"])
@@ -79,6 +80,7 @@ class ImageQuery(BaseModel):
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
     tone_map: ToneMap = DEFAULT_TONE_MAP
     color_space: views.ColorSpace = "srgb"
+    lut: Lut = None
 
     def view(self) -> View:
         if self.bits == Bits.SIXTEEN and 16 not in images.FORMATS[self.format].bits:
@@ -100,6 +102,7 @@ class ImageQuery(BaseModel):
 )
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
     query.view()  # before anything is rendered
+    await lut_of(request, query.lut)
     job = await submission.one_shot(request)
     try:
         if not await waiting.until(request, job.finished.wait()):
@@ -279,13 +282,20 @@ async def picture_file(
         if written is None:
             downloads.admit(caller, _most_bytes(job, query))
             with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
-                written = await _written(downloads, job, query)
+                written = await _written(downloads, job, query, await lut_of(request, query.lut))
             downloads.keep(caller, key, written, lasting=key is not None and query.aov == "all" and written.is_modest)
     return written
 
 
-async def _written(downloads: Downloads, job: Job, query: ImageQuery) -> Written:
-    view = query.view()
+async def lut_of(request: Request, id: str | None) -> messages.Lut | None:
+    """The table of colours that a query names. Raises InvalidDocument."""
+    if id is None:
+        return None
+    return await storing(partial(app_state(request).reader.lut, id, owner_of(request)), caller_of(request))
+
+
+async def _written(downloads: Downloads, job: Job, query: ImageQuery, lut: messages.Lut | None) -> Written:
+    view = replace(query.view(), lut=lut)
     layers: dict[str, np.ndarray] = {}
     samples = 0
     for aov in _aovs(query):
@@ -320,7 +330,12 @@ def _write(
     made_from = None
     if images.FORMATS[query.format].has_metadata:
         view = recipe.PictureView(
-            aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits, color_space=query.color_space
+            aov=query.aov,
+            exposure=query.exposure,
+            tone_map=query.tone_map,
+            bits=bits,
+            color_space=query.color_space,
+            lut=query.lut,
         )
         made_from = recipe.write_text(unfolded(document), job.order.settings, samples, view)
     if query.aov == "all":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, WithJsonSchema
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from service import displays
 from service.problems import FieldError, InvalidDocument
@@ -38,6 +38,10 @@ def shown_as(tone_map: str, color_space: ColorSpace, format: str = "png") -> dis
     return encoding
 
 
+Lut = Annotated[
+    str | None,
+    Field(max_length=100, description="The id of a .cube asset, through which displayed colours go last."),
+]
 # The short names come first: they are what an editor offers.
 _SCHEMA = {"anyOf": [{"type": "string", "enum": list(names)} for names in (TONE_MAPS, displays.names())]}
 ToneMap = Annotated[str, AfterValidator(_known), WithJsonSchema(_SCHEMA)]

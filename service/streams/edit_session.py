@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from service.config import MIB
-from service.ipc.messages import Update
+from service.ipc.messages import Lut, Update
 from service.pack import PackCache, parameter_edit, scene_edit
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, TooLarge
 from service.quality import ResolvedSettings
@@ -83,6 +83,10 @@ class EditSession:
         if self._difference is None or self._difference[0] is not old or self._difference[1] is not new:
             self._difference = old, new, scene_diff(old.scene, new.scene)
         return self._difference[2]
+
+    def lut(self, id: str) -> Lut:
+        """A table of displayed colours. Raises InvalidDocument."""
+        return self._reader.lut(id, self._owner)
 
     def settle(self) -> Update | None:
         """The update that brings the renderer up to the documents; None when it is there."""

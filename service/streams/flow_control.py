@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from service.ipc.messages import Frame, Want
+from service.ipc.messages import Frame, Lut, Want
 from service.problems import FieldError, InvalidDocument
 from service.streams.protocol import View
 
@@ -21,6 +21,7 @@ PATIENCE_S = 0.25
 class FlowControl:
     def __init__(self, task: int, send: Callable[[Want], None]) -> None:
         self.view = View()
+        self._lut: Lut | None = None
         self.generation: int | None = None
         self._task = task
         self._send = send
@@ -53,8 +54,9 @@ class FlowControl:
         self._answered.clear()
         self._ask()
 
-    def look(self, view: View) -> None:
-        self.view = view
+    def look(self, view: View, lut: Lut | None = None) -> None:
+        """`lut` is the table that the view names."""
+        self.view, self._lut = view, lut
         self._serial += 1  # what was asked for before is encoded otherwise, and unwelcome
         if self.generation is not None:
             self._anyway, self._asked = True, False
@@ -134,7 +136,7 @@ class FlowControl:
             return
         self._asked = True
         self._serial += 1
-        self._send(Want(self._task, self._serial, self.view.for_renderer(), self._anyway))
+        self._send(Want(self._task, self._serial, self.view.for_renderer(self._lut), self._anyway))
 
     def _interval_s(self) -> float:
         """Seconds between two frames; the first frame after an edit waits only where the view sets a rate."""

@@ -13,7 +13,7 @@ from service.displays import SRGB, encoding_of
 from service.ipc import messages
 from service.problems import TooLarge
 from service.scene.base import Model, hint
-from service.scene.look import ToneMap
+from service.scene.look import Lut, ToneMap
 from service.scene.text import load_json, most_bytes
 from service.scene.validation import validated
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, ColorSpace, StreamFormat
@@ -39,13 +39,14 @@ class View(Model):
         hint("Tone map", "How radiance beyond white is brought onto the screen."),
     ] = DEFAULT_TONE_MAP
     color_space: ColorSpace = "srgb"
+    lut: Lut = None
     aov: Aov = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
     bits: Annotated[Bits, Field(description="Of a PNG's channels.")] = 8
 
-    def for_renderer(self) -> messages.View:
+    def for_renderer(self, lut: messages.Lut | None = None) -> messages.View:
         encoding = images.FORMATS[self.format].encoding(self.bits)
-        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3)
+        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3, lut)
 
     @property
     def p3(self) -> bool:

@@ -215,6 +215,11 @@ class Stream:
             elif isinstance(message, Edit):
                 await self._flow.settled()
                 await self._take(message)
+            elif isinstance(message, protocol.ViewMessage):
+                try:
+                    await self._look(message)
+                except ServiceError as error:
+                    self._refuse(error, self._flow.generation)
             else:
                 self._obey(message)
 
@@ -227,7 +232,7 @@ class Stream:
                 if isinstance(message, protocol.Start):
                     self._renderers.divide(self._task, message.renderers)
                     if message.view is not None:
-                        self._flow.look(message.view.over(self._flow.view))
+                        await self._look(message.view)
             except ServiceError as error:
                 self._refuse(error, message.generation)
             if not self._inbox or not isinstance(self._inbox[0].message, Edit):
@@ -265,10 +270,14 @@ class Stream:
             self._done = None
             self._flow.update(update.generation, began)
 
+    async def _look(self, message: protocol.View) -> None:
+        """Show the picture so. A view whose table of colours is not there changes nothing. Raises ServiceError."""
+        view = message.over(self._flow.view)
+        lut = None if view.lut is None else await self._executor.run(partial(self._live.lut, view.lut))
+        self._flow.look(view, lut)
+
     def _obey(self, message: protocol.Message) -> None:
-        if isinstance(message, protocol.ViewMessage):
-            self._flow.look(message.over(self._flow.view))
-        elif message.type == "ping":
+        if message.type == "ping":
             self._post({"type": "pong"})
         elif self._live.version is None:
             self._refuse(Conflict(f"Nothing was started yet: send start before {message.type}."), None)

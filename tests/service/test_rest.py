@@ -20,7 +20,7 @@ from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
 from service.images import read_metadata
-from tests.asset_files import OBJ
+from tests.asset_files import OBJ, read_png
 from tests.calls import is_problem, pixels, start, status
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server, wait_until
 from tests.serving import client as opened
@@ -104,6 +104,21 @@ def test_image_shapes_and_depths(http: httpx.Client) -> None:
     assert np.array(Image.open(io.BytesIO(bright))).mean() > np.array(Image.open(io.BytesIO(png))).mean()
     sixteen = http.get(f"/v1/renders/{id}/image", params={"bits": 16}).content
     assert sixteen[24] == 16  # IHDR's bit depth
+
+
+def test_displayed_colours_go_through_a_cube(http: httpx.Client, running: str) -> None:
+    cube = http.post("/v1/assets", content=b"LUT_1D_SIZE 2\n1 1 1\n0 0 0\n").json()
+    assert cube["kind"] == "lut"
+    http.delete(f"/v1/renders/{running}")
+    image = f"/v1/renders/{running}/image"
+    plain, turned = (
+        read_png(http.get(image, params=query).content).astype(int) for query in ({}, {"lut": cube["id"]})
+    )
+    assert np.abs(255 - plain[..., :3] - turned[..., :3]).max() <= 1
+    mesh = http.post("/v1/assets", content=OBJ).json()["id"]
+    for lut in (mesh, "sha256:" + "0" * 64, "x"):
+        assert is_problem(http.get(image, params={"lut": lut}), 422, "/lut")
+    assert is_problem(http.post("/v1/render?lut=x", json={"scene": SCENE}), 422, "/lut")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer
+from gpu import Lut, Picture, Renderer
 from gpu.picture.display import srgb
 from service import displays
 from service.colorimetry import decode_srgb
@@ -97,3 +97,43 @@ def test_views_end_in_their_limits(canvas: Picture, colors: np.ndarray, radiance
     for exposure in (-60.0, 60.0):
         shown = canvas.display(tone_map=view_tables.view_table(*ACES2), exposure=exposure, dtype="f4", color=lit)
         assert np.isfinite(shown).all() and (shown >= 0).all() and (shown <= 1).all()
+
+
+@pytest.mark.parametrize("side", [2, 17])
+def test_a_cube_is_interpolated_in_tetrahedra(canvas: Picture, colors: np.ndarray, side: int) -> None:
+    """Between sorted axes: each vertex is reached from the one before along the axis that has most left."""
+    table = np.random.default_rng(side).random((side, side, side, 3)).astype(np.float32)
+    shown = canvas.display(tone_map="reinhard", dtype="f4", color=colors)[..., :3].reshape(-1, 3)
+    through = canvas.display(tone_map="reinhard", dtype="f4", color=colors, lut=Lut(f"cube{side}", table))
+    at = shown.astype(float) * (side - 1)
+    low = np.minimum(at.astype(int), side - 2)
+    left = at - low
+    order = np.argsort(-left, axis=1)
+    weights = np.take_along_axis(left, order, 1)
+    expected = table[low[:, 2], low[:, 1], low[:, 0]] * (1 - weights[:, :1])
+    for k in range(3):
+        low[np.arange(len(low)), order[:, k]] += 1
+        step = weights[:, k] - (weights[:, k + 1] if k < 2 else 0)
+        expected += table[low[:, 2], low[:, 1], low[:, 0]] * step[:, None]
+    np.testing.assert_allclose(through[..., :3].reshape(-1, 3), expected, atol=1e-4)
+
+
+def test_curves_hold_at_the_ends_of_their_domain(canvas: Picture, colors: np.ndarray) -> None:
+    curve = np.float32([[0.2, 0, 1], [0.4, 1, 0], [0.9, 0.5, 0.5]])
+    lut = Lut("curves", curve, (0.25, 0, 0), (0.75, 1, 2))
+    shown = canvas.display(tone_map="reinhard", dtype="f4", color=colors)[..., :3]
+    through = canvas.display(tone_map="reinhard", dtype="f4", color=colors, lut=lut)[..., :3]
+    places = [np.linspace(low, high, 3) for low, high in zip(lut.low, lut.high, strict=True)]
+    expected = np.stack([np.interp(shown[..., k], places[k], curve[:, k]) for k in range(3)], axis=-1)
+    np.testing.assert_allclose(through, expected, atol=1e-4)
+
+
+def test_a_cube_follows_a_view(canvas: Picture, colors: np.ndarray) -> None:
+    """Both tables are in one buffer; the cube here turns the channels round."""
+    axis = np.linspace(0, 1, 5, dtype=np.float32)
+    blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
+    turned = Lut("turned", np.stack([green, blue, red], axis=-1))
+    view = view_tables.view_table(*ACES2)
+    shown = canvas.display(tone_map=view, dtype="f4", color=colors)
+    through = canvas.display(tone_map=view, dtype="f4", color=colors, lut=turned)
+    np.testing.assert_allclose(through[..., :3], shown[..., [1, 2, 0]], atol=1e-4)

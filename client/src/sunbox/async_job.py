@@ -139,12 +139,12 @@ class AsyncPicture:
         return await self.fetch("exr", aov="all")
 
     async def png(self, **view: Any) -> bytes:
-        """As on a screen. `view`: bits, exposure, tone_map, color_space, aov."""
+        """As on a screen. `view`: bits, exposure, tone_map, color_space, lut, aov."""
         return await self.fetch("png", **view)
 
     async def save(self, path: str | Path, **view: Any) -> None:
         """A file in the format of its ending: .png, .jpg, .webp, .avif, .exr, .hdr or .npy. `view`: bits, exposure,
-        tone_map, color_space, aov. Raises ValueError, OSError, Refused."""
+        tone_map, color_space, lut, aov. Raises ValueError, OSError, Refused."""
         path = Path(path)
         format = FORMATS.get(path.suffix.lower())
         if format is None:

@@ -298,7 +298,7 @@ class Picture:
         return run(self._picture.exr())
 
     def png(self, **view: Any) -> bytes:
-        """As on a screen. `view`: bits, exposure, tone_map, color_space, aov."""
+        """As on a screen. `view`: bits, exposure, tone_map, color_space, lut, aov."""
         return run(self._picture.png(**view))
 
     def save(self, path: str | Path, **view: Any) -> None:
@@ -361,7 +361,7 @@ class Stream:
         run(self._stream.update(patch, **settings))
 
     def view(self, **view: Any) -> None:
-        """How frames look: format, quality, exposure, tone_map, color_space, aov, max_fps, bits."""
+        """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits."""
         run(self._stream.view(**view))
 
     def pause(self) -> None:

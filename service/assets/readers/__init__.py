@@ -8,5 +8,6 @@ polygons     polygons -> triangles
 raw_mesh     the result of a reader, and the checks that every mesh has to pass
 mesh_checks  oddities of a mesh: repeated triangles, edges of too many, inside out
 rendered     OpenEXR files that Sunbox wrote: colour, its variance and its samples
+cube         tables of colours, one or three axes
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 """

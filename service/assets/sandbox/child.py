@@ -16,7 +16,7 @@ import numpy as np
 
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, Pose, RenderedPicture, SceneFile
+from service.assets.types import AssetLimits, ImageData, LutData, MeshData, Pose, RenderedPicture, SceneFile
 from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
@@ -72,13 +72,14 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
 
 
-Parsed = MeshData | ImageData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | SceneFile | RenderedPicture
 
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
     from service.assets.gltf.importer import read_scene
+    from service.assets.readers.cube import parse_cube
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.readers.rendered import parse_rendered
     from service.assets.sandbox.parse_mesh import parse_mesh
@@ -90,6 +91,8 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     if format in SIGNATURES:
         data = os.pread(source, size, 0)
         return parse_rendered(data, limits) if whole else parse_image(format, data, limits)
+    if format == "cube":
+        return parse_cube(os.pread(source, size, 0))
     # The file is in memory already: it is mapped, not copied.
     mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
@@ -109,6 +112,8 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, RenderedPicture):
         facts = {name: value for name, value in vars(parsed).items() if name != "layers"}
         return {"layers": [parsed.layers]}, facts
+    if isinstance(parsed, LutData):
+        return {"lut": [parsed.values]}, {"low": parsed.low, "high": parsed.high}
     if isinstance(parsed, ImageData):
         return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
     arrays: dict[str, Pieces] = {

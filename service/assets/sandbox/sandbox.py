@@ -18,6 +18,7 @@ from service.assets.types import (
     Animation,
     AssetLimits,
     ImageData,
+    LutData,
     MeshData,
     MeshOddities,
     Pose,
@@ -52,7 +53,7 @@ CRASHES = {
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
 
-Parsed = MeshData | ImageData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | SceneFile | RenderedPicture
 
 # The type of each array of a mesh, and the shape of its rows.
 MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
@@ -96,13 +97,13 @@ class Sandbox:
                 _log_rights(self._rights)
             return self._rights
 
-    def parse(self, format: str, source: bytes | int) -> MeshData | ImageData:
+    def parse(self, format: str, source: bytes | int) -> MeshData | ImageData | LutData:
         """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh.
 
         Raises ParseError.
         """
         parsed = self._bounded(format, source, False)
-        assert isinstance(parsed, MeshData | ImageData)
+        assert isinstance(parsed, MeshData | ImageData | LutData)
         return parsed
 
     def parse_scene(self, format: str, source: bytes | int, pose: Pose | None = None) -> SceneFile:
@@ -210,6 +211,8 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
         os.close(fd)
     if "pixels" in arrays:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
+    if "lut" in arrays:
+        return lut_of(arrays["lut"], reply["low"], reply["high"])
     if "layers" in arrays:
         estimator, sampler, depth = reply["ways"]
         return RenderedPicture(
@@ -219,6 +222,17 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
     if "scene" in arrays:
         return _scene(arrays["scene"], arrays.get("files", np.empty(0, np.uint8)))
     return mesh_of(arrays, tuple(map(str, reply["warnings"])), _oddities(reply["oddities"]))
+
+
+def lut_of(values: Array, low: list[float], high: list[float]) -> LutData:
+    """Raises ValueError where it has not the form that the renderer relies on."""
+    sides = values.shape[:-1]
+    if values.dtype.str != "<f4" or values.shape[-1] != 3 or len(sides) not in (1, 3) or min(sides) < 2:
+        raise ValueError(f"a table with shape {values.shape} and dtype {values.dtype}")
+    if len(set(sides)) != 1:
+        raise ValueError(f"a table with shape {values.shape}")
+    (x, y, z), (u, v, w) = map(float, low), map(float, high)
+    return LutData(values, (x, y, z), (u, v, w))
 
 
 def mesh_of(arrays: dict[str, Array], warnings: tuple[str, ...], oddities: MeshOddities) -> MeshData:

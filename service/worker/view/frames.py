@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gpu import FIRST_HIT_AOVS, picture_bytes
+from gpu import FIRST_HIT_AOVS, Lut, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
 from service.displays import view_of
@@ -244,6 +244,7 @@ def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarra
     color = clean.pixels if clean else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
+    lut = Lut(view.lut.key, view.lut.values, view.lut.low, view.lut.high) if view.lut else None
     named = view_of(view.tone_map, view.p3)
     tone_map = view_table(*named) if named else view.tone_map
-    return picture.display(view.aov, view.exposure, tone_map, view.encoding, color, view.p3)
+    return picture.display(view.aov, view.exposure, tone_map, view.encoding, color, view.p3, lut)

@@ -51,6 +51,18 @@ def test_frames_for_wide_screens_say_so(client: Client) -> None:
     assert "icc_profile" not in Image.open(io.BytesIO(client.frame().image)).info
 
 
+def test_frames_go_through_a_cube(client: Client, server: Server) -> None:
+    client.start(view={"format": "png"})
+    _, frame = client.finished()
+    plain = np.asarray(Image.open(io.BytesIO(frame.image)), int)
+    client.say("view", lut="sha256:" + "0" * 64)
+    assert client.until("error")[0]["problem"]["errors"][0]["pointer"] == "/lut"
+    cube = server.http.post("/v1/assets", content=b"LUT_1D_SIZE 2\n1 1 1\n0 0 0\n").json()
+    client.say("view", lut=cube["id"])
+    turned = np.asarray(Image.open(io.BytesIO(client.frame().image)), int)
+    assert np.abs(255 - plain[..., :3] - turned[..., :3]).max() <= 1
+
+
 def test_a_view_keeps_what_it_does_not_name(client: Client) -> None:
     client.start(view={"format": "png"})
     client.finished()
