@@ -16,6 +16,7 @@ pack       a document -> the renderer's arrays
 assets     meshes and images that scenes refer to
 images     pixels -> files
 presets    built-in scenes, materials and environments
+exports    scenes and materials -> files of other programs
 requests   from what a caller wrote to what the renderer takes
 renders    renders asked for over REST
 batches    renders of one scene that differ along axes

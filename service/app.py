@@ -42,7 +42,19 @@ from service.renders.queue import RenderQueue
 from service.renders.retention import QueueLimits, Retention
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import RequestReader
-from service.routes import assets, batches, bsdf, callbacks, compare, documents, info, materials, renders, stream
+from service.routes import (
+    assets,
+    batches,
+    bsdf,
+    callbacks,
+    compare,
+    documents,
+    export,
+    info,
+    materials,
+    renders,
+    stream,
+)
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import Files, respond, tell_errors
@@ -101,7 +113,20 @@ def create_app(config: Config) -> FastAPI:
         redoc_url=None,
     )
     app.state.sunbox = state
-    api = (info, preset_routes, assets, documents, renders, batches, callbacks, compare, materials, bsdf, stream)
+    api = (
+        info,
+        preset_routes,
+        assets,
+        documents,
+        renders,
+        batches,
+        callbacks,
+        compare,
+        materials,
+        bsdf,
+        export,
+        stream,
+    )
     for router in (each.router for each in api):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)

@@ -58,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
     _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
+    _export(commands.add_parser("export", help="turn a scene into a file for another program"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains and needs"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
     _mcp(commands.add_parser("mcp", help="serve tools for agents on stdin and stdout, by the Model Context Protocol"))
@@ -241,6 +242,14 @@ def _import(command: argparse.ArgumentParser) -> None:
     command.add_argument("--variant", metavar="NAME", help="a glTF file's materials in this variant")
     command.add_argument("--animation", metavar="NAME", help="a glTF file as this animation has it")
     command.add_argument("--time", type=float, metavar="S", help="at this time in the animation (default: its start)")
+    _asset_root(command)
+
+
+def _export(command: argparse.ArgumentParser) -> None:
+    text = "a scene's JSON, a glTF, OBJ, PLY or STL model, or a PNG or EXR that Sunbox made"
+    command.add_argument("input", metavar="SCENE", help=text)
+    text = "the file, whose ending says its format: .glb. What it has no place for is printed on stderr"
+    command.add_argument("-o", "--output", required=True, metavar="OUT", help=text)
     _asset_root(command)
 
 

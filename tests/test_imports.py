@@ -45,7 +45,7 @@ LAYERS = [
     {"service.assets"},
     {"service.file_formats"},
     {"service.storage"},
-    {"service.pack"},
+    {"service.pack", "service.exports"},
     {"service.requests"},
     {"service.renderers"},
     {"service.renders"},

@@ -12,7 +12,7 @@ from service.assets.errors import ParseError
 from service.assets.source import format_of
 from service.assets.store import AssetStore
 from service.assets.types import AssetLimits, ImageData, LutData, MeshData
-from service.problems import AssetError
+from service.problems import AssetError, NotFound
 
 
 class FileAssets:
@@ -46,6 +46,11 @@ class FileAssets:
 
     def read(self, ref: str) -> bytes:
         """The bytes of a file. Raises AssetError."""
+        if ref.startswith("sha256:"):
+            try:
+                return self._store(ref).read(ref)
+            except NotFound as error:
+                raise AssetError(error.detail) from None
         fd = _open(self._find(ref), ref)
         with open(fd, "rb") as file:
             return file.read()

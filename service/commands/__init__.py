@@ -14,6 +14,7 @@ bsdf           curves of a material's BSDF, into a table or a figure
 bsdf_curves    the curves of each kind
 bsdf_figure    the figures, drawn by matplotlib
 import         a model as a document with files beside it
+export         a scene as a file for another program
 info           what a scene contains, and what would render it here
 callback_secret  the secrets that sign callbacks
 mcp            tools for agents

@@ -29,6 +29,10 @@ class SourceAssets:
         """Raises AssetError."""
         return self._found.image(self._where(ref))
 
+    def read(self, ref: str) -> bytes:
+        """The bytes of a file. Raises AssetError."""
+        return self._found.read(self._where(ref))
+
     def lut(self, ref: str) -> tuple[str, LutData]:
         """A table of colours and its id. It is copied into the data folder, so that its picture can be made again.
         Raises AssetError."""

@@ -15,6 +15,7 @@ from typing import Any
 from service.config import MIB, Config
 from service.ipc import channel
 from service.problems import ServiceError, TooLarge, Unavailable
+from service.requests.export_request import ParsedExport
 from service.requests.parser_child import Failed, Work
 from service.requests.parsers import Kind
 from service.requests.request_parser import ParsedRequest
@@ -34,6 +35,7 @@ ANSWERS = {
     "service.quality",
     "service.requests.batch_request",
     "service.requests.bsdf_request",
+    "service.requests.export_request",
     "service.requests.parser_child",
     "service.requests.request_parser",
 }
@@ -142,7 +144,7 @@ def allowed(module: str, name: str) -> Any:
 
 def _believed(answer: Any) -> Any:
     """The answer. Its meshes are looked at again: compiled code reads the vertices that faces name."""
-    scene = answer.scene if isinstance(answer, ParsedRequest) else answer
+    scene = answer.scene if isinstance(answer, ParsedRequest | ParsedExport) else answer
     for shape in scene.shapes if isinstance(scene, Scene) else ():
         if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
             raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")

@@ -10,13 +10,14 @@ from service.requests.batch_request import parse_batch
 from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
 from service.requests.compare_request import parse_compare
 from service.requests.conversion_request import parse_conversion
+from service.requests.export_request import parse_export
 from service.requests.request_parser import RequestParser
 from service.scene import load_json
 from service.storage.documents import checked
 
 Kind = Literal[
     "render", "keyed_render", "batch", "request", "scene", "scenes", "materials", "bsdf", "albedo", "terms",
-    "conversion", "comparison",
+    "conversion", "comparison", "export",
 ]  # fmt: skip
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
@@ -32,4 +33,5 @@ PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "terms": lambda config, body: parse_terms(body),
     "conversion": lambda config, body: parse_conversion(body),
     "comparison": lambda config, body: parse_compare(config, body),
+    "export": lambda config, body: parse_export(config, body),
 }

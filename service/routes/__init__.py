@@ -11,6 +11,8 @@ events           the progress of renders as server-sent events
 waiting          waits that end when the client goes away
 stream           the stream's WebSocket
 materials        a material turned into another model
+export           a scene as another program's file
+exporting        what calls share that write such a file
 bsdf             values of a material's BSDF
 assets           uploads
 asset_answers    what uploads are answered

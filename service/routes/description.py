@@ -51,6 +51,7 @@ NAMES = {
     "GET /v1/batches/{id}/animation": "getBatchAnimation",
     "GET /v1/callbacks": "listCallbacks",
     "POST /v1/compare": "compare",
+    "POST /v1/export": "exportScene",
     "POST /v1/materials/convert": "convertMaterial",
     "POST /v1/bsdf": "evaluateBsdf",
     "POST /v1/bsdf/albedo": "getBsdfAlbedo",

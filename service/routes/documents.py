@@ -8,7 +8,9 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 
-from service.routes import answers
+from service.exports import FORMATS, material_format, material_scene, scene_format
+from service.routes import answers, exporting
+from service.scene import Scene, load_json, parse_scene
 from service.state import app_state, caller_of, owner_of
 from service.storage.documents import (
     BY_LINK,
@@ -20,7 +22,7 @@ from service.storage.documents import (
     check_kind,
     etag,
 )
-from service.system.executors import saving
+from service.system.executors import packing, saving
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 
@@ -54,6 +56,10 @@ ByLink = Annotated[
         f"read it for {LINK_DAYS} days."
     ),
 ]
+Format = Annotated[
+    str | None,
+    Query(description="A file instead of the JSON.", json_schema_extra={"enum": list(FORMATS)}),
+]
 Limit = Annotated[int, Query(ge=1, le=MOST_NAMES)]
 After = Annotated[str | None, Query(max_length=LONGEST_NAME, description="Names behind this one only.")]
 IfMatch = Annotated[str | None, Header(description="The `ETag` that the document must have, or `*`.")]
@@ -74,12 +80,23 @@ async def names(
     return [answers.Named(**entry) for entry in found]
 
 
-@router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
+@router.get(
+    "/{kind}/{name}",
+    summary="The bare document, or a file for another program",
+    responses=answers.DOCUMENT | answers.problems(404, 413, 422, 429, 501),
+)
 async def document(
-    request: Request, kind: answers.DocumentKind, name: Name, if_none_match: IfNoneMatch = None
+    request: Request,
+    kind: answers.DocumentKind,
+    name: Name,
+    format: Format = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """One's own, or else one that another key shares. Its `ETag` serves for a later `If-Match`."""
+    """One's own, or else one that another key shares. Its `ETag` serves for a later `If-Match`. With `format`, what
+    that has no place for is in the header `Sunbox-Lost`."""
     state = app_state(request)
+    if format is not None:
+        return await _exported(request, kind, name, format)
 
     def read() -> tuple[bytes, str]:
         data = state.storage.documents.get(kind, name, owner_of(request))
@@ -90,6 +107,20 @@ async def document(
     if if_none_match is not None and {"*", tag} & set(_tags(if_none_match) or ()):
         return Response(status_code=304, headers=headers)
     return await state.downloads.answer(caller_of(request), data, JSON, headers)
+
+
+async def _exported(request: Request, kind: str, name: str, format: str) -> Response:
+    wanted = (material_format if check_kind(kind) == "materials" else scene_format)(format, "/format")
+    data = await saving(partial(app_state(request).storage.documents.get, kind, name, owner_of(request)))
+    if kind == "scenes":
+        scene = await packing(partial(_scene, data), caller_of(request))
+        return await exporting.written(request, scene, wanted, wanted.scene_writer, "")
+    scene, within = await packing(partial(material_scene, data, name), caller_of(request))
+    return await exporting.written(request, scene, wanted, wanted.material_writer, "", within)
+
+
+def _scene(data: bytes) -> Scene:
+    return parse_scene(load_json(data))
 
 
 @router.put(

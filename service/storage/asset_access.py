@@ -8,7 +8,7 @@ from pathlib import Path
 
 from service.assets import Assets, AssetStore, ImageData, MeshData
 from service.assets.store import ID, unknown
-from service.problems import AssetError
+from service.problems import AssetError, NotFound
 from service.scene import Scene
 from service.storage.database import Database
 
@@ -58,14 +58,17 @@ class AssetAccess:
 
     def view(self, owner: str, scene: Scene) -> Assets:
         """The assets as this owner sees them, for packing this scene."""
-        foreign = self.foreign(owner, set(_references(scene))) if owner else set()
-        return _Visible(self._assets, foreign) if foreign else self._assets
+        return self.files(owner, scene)
+
+    def files(self, owner: str, scene: Scene) -> VisibleFiles:
+        """The same with their bytes, for writing this scene to a file."""
+        return VisibleFiles(self._assets, self.foreign(owner, set(references(scene))) if owner else set())
 
 
-class _Visible:
-    """Assets without the foreign ones."""
+class VisibleFiles:
+    """Assets without the foreign ones. Methods raise AssetError."""
 
-    def __init__(self, assets: Assets, foreign: set[str]) -> None:
+    def __init__(self, assets: AssetStore, foreign: set[str]) -> None:
         self._assets = assets
         self._foreign = foreign
 
@@ -77,12 +80,27 @@ class _Visible:
         self._check(ref)
         return self._assets.image(ref)
 
+    def read(self, ref: str) -> bytes:
+        self._check(ref)
+        try:
+            return self._assets.read(ref)
+        except NotFound as error:
+            raise AssetError(error.detail) from None
+
+    def size(self, ref: str) -> int:
+        """The bytes of a file; 0 where there is none."""
+        try:
+            return 0 if ref in self._foreign else self._assets.info(ref).bytes
+        except (NotFound, AssetError):
+            return 0
+
     def _check(self, ref: str) -> None:
         if ref in self._foreign:
             raise AssetError(unknown(ref).detail)
 
 
-def _references(scene: Scene) -> Iterator[str]:
+def references(scene: Scene) -> Iterator[str]:
+    """The assets of a scene."""
     for holder in (scene.environment, *scene.textures.values(), *scene.shapes):
         if (ref := getattr(holder, "asset", None)) is not None:
             yield ref

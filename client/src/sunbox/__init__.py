@@ -11,6 +11,7 @@ files            the files that a scene names, and arrays in it
 frames           a frame of a stream
 lobes            what a BSDF answers, as arrays
 verdicts         whether two pictures differ beyond noise
+exports          scenes as files for other programs
 merge            merge patches (RFC 7386)
 progress         a line while a render goes on
 view             View: a live picture in a notebook
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from sunbox.async_stream import AsyncStream
     from sunbox.client import Batch, Client, Job, Picture, Stream
     from sunbox.errors import Failed, NotFound, Refused, SunboxError, Unreachable
+    from sunbox.exports import Exported
     from sunbox.frames import Frame
     from sunbox.lobes import Albedo, Bsdf, SpecularLobe
     from sunbox.local import render
@@ -53,6 +55,7 @@ _PLACES = {
     "async_stream": ("AsyncStream",),
     "client": ("Batch", "Client", "Job", "Picture", "Stream"),
     "errors": ("Failed", "NotFound", "Refused", "SunboxError", "Unreachable"),
+    "exports": ("Exported",),
     "frames": ("Frame",),
     "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
     "local": ("render",),
@@ -71,6 +74,7 @@ __all__ = [
     "Batch",
     "Bsdf",
     "Client",
+    "Exported",
     "Failed",
     "Frame",
     "Job",

@@ -13,7 +13,7 @@ from urllib.parse import quote, urlencode
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sunbox import files, lobes, verdicts
+from sunbox import exports, files, lobes, verdicts
 from sunbox.async_batch import AsyncBatch
 from sunbox.async_job import AsyncJob, AsyncPicture
 from sunbox.async_stream import AsyncStream
@@ -163,6 +163,10 @@ class AsyncClient:
         """What a file is: kind, size, warnings; of a scene `variants` and `animations` (name, duration), too."""
         id = await self.upload(path)
         return dict(await self._transport.json("GET", f"/v1/assets/{id}", headers={"accept": "application/json"}))
+
+    async def export(self, scene: Any, format: str = "glb") -> exports.Exported:
+        """A scene as a file for other programs: its bytes, and what its format has no place for."""
+        return await exports.export(self._transport, scene, format)
 
     async def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> lobes.Bsdf:
         """A material's BSDF for each of n directions `wo`, (n, 3), and m directions `wi`, (m, 3), in the shading

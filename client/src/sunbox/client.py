@@ -16,6 +16,7 @@ from sunbox.async_client import AsyncClient
 from sunbox.async_job import AsyncJob, AsyncPicture, Pixels, Status
 from sunbox.async_stream import AsyncStream
 from sunbox.background import Background
+from sunbox.exports import Exported
 from sunbox.frames import Frame
 from sunbox.lobes import Albedo, Bsdf
 from sunbox.verdicts import Verdict
@@ -117,6 +118,10 @@ class Client:
     def describe(self, path: str | Path) -> dict[str, Any]:
         """What a file is; of a scene with its `variants` and `animations`."""
         return run(self._client.describe(path))
+
+    def export(self, scene: Any, format: str = "glb") -> Exported:
+        """A scene as a file for other programs: its `data`, and what is `lost`."""
+        return run(self._client.export(scene, format))
 
     def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> Bsdf:
         """A material's BSDF for directions `wo`, (n, 3), and `wi`, (m, 3), in the shading frame: z is the normal."""

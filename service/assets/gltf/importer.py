@@ -16,7 +16,7 @@ from service.assets.gltf.json_view import JsonView, whole
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
 from service.assets.gltf.placements import Part, Placements
-from service.assets.gltf.primitives import Primitive, read_primitive
+from service.assets.gltf.primitives import Primitive, own_notes, read_primitive
 from service.assets.gltf.textures import Textures
 from service.assets.readers.raw_mesh import MAX_COORDINATE
 from service.assets.scenes.framing import framed
@@ -73,15 +73,17 @@ class _Importer:
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
         lighting = Warnings()
-        remark = stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
+        is_dark = _is_dark(file)
+        remark = None if is_dark else stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
         if remark is not None:
             lighting.add("", remark)
         exposure = self._metered(used, aspect, lighting) if lights else None
         warnings = [*lighting.document(), *self.notes.document()]  # warnings about the whole picture come first
         triangles = sum(part.triangles for part in self.placements.shown)
         bounds = [corner.tolist() for corner in around]
+        is_lit = bool(lights) or is_dark
         return SceneFile(
-            used, self.files.parts, warnings, triangles, bool(lights), exposure, aspect, bounds, self.variants,
+            used, self.files.parts, warnings, triangles, is_lit, exposure, aspect, bounds, self.variants,
             self.animations,
         )  # fmt: skip
 
@@ -166,7 +168,7 @@ class _Importer:
             )
         sides = {"double_sided": material.flag("doubleSided")}
         shape = {"type": "mesh", "asset": reference, "material": name} | sides
-        if primitive.normals is None:  # the specification demands flat triangles then
+        if primitive.normals is None and not primitive.is_smooth:  # the specification demands flat triangles then
             shape["smooth"] = False
         return Part(shape, vertices, primitive.faces)
 
@@ -176,6 +178,14 @@ class _Importer:
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only scene {whole(root.value.get('scene', 0), '/scene')} is shown")
         note_unsupported(root, self.notes)
+
+
+def _is_dark(file: GltfDocument) -> bool:
+    """Whether an exporter of ours says that nothing surrounds the scene: then no default environment lights it."""
+    if not file.count("scenes"):
+        return False
+    scene = file.item("scenes", file.root.value.get("scene", 0), "/scene")
+    return own_notes(scene).get("environment") == "none"
 
 
 def _named(node: Node, mesh: JsonView) -> str:

@@ -100,4 +100,4 @@ def _axis(node: Node, axis: int, sign: int) -> list[float]:
     direction = sign * node.world[:3, axis]
     length = float(np.linalg.norm(direction))
     unit = direction / length if length > 0 else sign * np.eye(3)[axis]
-    return [float(value) for value in unit]
+    return [float(value) + 0.0 for value in unit]  # no -0

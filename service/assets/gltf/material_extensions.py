@@ -21,7 +21,7 @@ def add(read: MaterialReader, document: dict[str, Any]) -> None:
     transmission = read.place.extension("KHR_materials_transmission")
     through = transmission.number("transmissionFactor", 0, 0, 1) if transmission else 0.0
     clear = transmission is not None and through > 0
-    if ior != DEFAULT_IOR:
+    if "KHR_materials_ior" in (read.place.value.get("extensions") or {}) or ior != DEFAULT_IOR:
         document["ior"] = ior
     _specular(read, document, ior, clear)
     _sheen(read, document)
@@ -66,8 +66,8 @@ def _specular(read: MaterialReader, document: dict[str, Any], ior: float, clear:
         return
     weight = extension.number("specularFactor", 1, 0, 1)
     color = extension.color("specularColorFactor", (1.0, 1.0, 1.0))
-    strength = max(color)
-    tint = tuple(value / strength for value in color) if strength else (1.0, 1.0, 1.0)
+    strength = max(*color, 1.0)  # a colour within 0..1 is principled's own; a brighter one needs a higher index
+    tint = tuple(value / strength for value in color)
     document["specular_color"] = read.color(extension, "specularColorTexture", tint)
     if document["specular_color"] == 1:
         del document["specular_color"]

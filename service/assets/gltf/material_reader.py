@@ -21,7 +21,9 @@ class MaterialReader:
         return self.textures.use(owner.object(name), space, self.charts) if owner else None
 
     def color(self, owner: JsonView, name: str, values: tuple[float, ...]) -> Any:
-        """A colour, or the texture that it multiplies."""
+        """A colour, or the texture that it multiplies; black times a texture is black."""
+        if not max(values):
+            return 0.0
         texture = self.texture(owner, name, "srgb")
         return factor(values) if texture is None else {"texture": texture, "factor": factor(values)}
 
@@ -35,6 +37,8 @@ class MaterialReader:
     def scalar(self, owner: JsonView, name: str, value: float, channel: str, space: ColorSpace = "linear") -> Any:
         """A number, or the texture's channel that it multiplies; an image without alpha has 1 there."""
         info = owner.object(name)
+        if not value:
+            return 0.0
         if channel == "a" and info is not None and "A" not in self.textures.channels(info):
             return value
         texture = self.texture(owner, name, space)

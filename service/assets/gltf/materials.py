@@ -23,6 +23,7 @@ class Materials:
         self.file, self.textures, self.notes = file, textures, notes
         self.documents: dict[str, dict[str, Any]] = {}
         self._names: dict[tuple[Any, ...], str] = {}
+        self._called: dict[str, list[str]] = {}  # names of documents by the file's name for them
 
     def name(self, primitive: JsonView, charts: tuple[Chart | None, ...]) -> tuple[str, JsonView]:
         """The document's name for a primitive's material, and the material."""
@@ -34,11 +35,13 @@ class Materials:
         key = place.pointer, self.textures.kinds(charts), directed
         if key not in self._names:
             document = self._document(read)
-            same = [n for (pointer, *_), n in self._names.items() if pointer == place.pointer]
+            called = place.text("name") or place.pointer[1:].replace("/", " ") or "default"
+            same = self._called.setdefault(called, [])  # a file has one material twice where its sides differ
             found = next((name for name in same if self.documents[name] == document), None)
             if found is None:
-                found = unique(place.text("name") or place.pointer[1:].replace("/", " ") or "default", self.documents)
+                found = unique(called, self.documents)
                 self.documents[found] = document
+                same.append(found)
             self._names[key] = found
         return self._names[key], place
 

@@ -11,7 +11,7 @@ from service.assets.gltf.nodes import Nodes, instances
 from service.assets.gltf.primitives import UV_SETS, Primitive, read_primitive
 from service.assets.readers.raw_mesh import RawMesh
 from service.assets.scenes.warnings import Warnings
-from service.assets.types import AssetLimits
+from service.assets.types import AssetLimits, Indices
 
 
 def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
@@ -58,8 +58,15 @@ def _joined(parts: list[Primitive], warnings: list[str]) -> RawMesh:
         _rows([None if p.colors is None else p.colors[:, :3] for p in parts], parts, 3, 1.0),
         warnings,
         _rows([p.tangents for p in parts], parts, 4),
-        np.zeros(len(faces), np.int32) if normals is None else None,  # the specification demands flat triangles then
+        None if normals is not None else _groups(parts),
     )
+
+
+def _groups(parts: list[Primitive]) -> Indices:
+    """The smoothing group of each triangle: 0 for facets, which the specification demands without normals."""
+    return np.concatenate([
+        np.full(len(part.faces), k if part.is_smooth else 0, np.int32) for k, part in enumerate(parts, 1)
+    ])  # fmt: skip
 
 
 def _rows(columns: list[Array | None], parts: list[Primitive], width: int, missing: float = 0.0) -> Array | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class Primitive:
     weights: tuple[Floats, ...] = ()
     tangents: Array | None = None  # (n, 4)
     numbers: Longs | None = None  # the file's numbers of these vertices; None: all
+    is_smooth: bool = False  # without normals: they are computed, as they were when our exporter wrote the file
 
     def detail(self) -> Iterator[tuple[str, Array]]:
         """The attributes of its vertices besides the position, by name."""
@@ -123,6 +125,9 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
     if not len(triangles):
         notes.leave_out(place.pointer, "the primitive has no triangles and is left out")
         return None
+    is_smooth = own_notes(place).get("normals") == "computed" and "TANGENT" not in rows and "NORMAL" in rows
+    if is_smooth:
+        del rows["NORMAL"]
     sets = sum(f"JOINTS_{k}" in rows and f"WEIGHTS_{k}" in rows for k in range(len(rows)))
     return Primitive(
         vertices,
@@ -133,7 +138,15 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
         tuple(rows[f"JOINTS_{k}"] for k in range(sets)),
         tuple(_unit(rows[f"WEIGHTS_{k}"]) for k in range(sets)),
         _unit(rows["TANGENT"]) if "TANGENT" in rows and "NORMAL" in rows else None,  # else ignored, says the standard
+        is_smooth=is_smooth,
     ).compact()
+
+
+def own_notes(place: JsonView) -> dict[str, Any]:
+    """What our exporter noted in an object's `extras`; nothing where somebody else wrote something there."""
+    extras = place.value.get("extras")
+    noted = extras.get("sunbox") if isinstance(extras, dict) else None
+    return noted if isinstance(noted, dict) else {}
 
 
 TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),

@@ -9,6 +9,7 @@ from service.assets.errors import ParseError
 from service.assets.types import Doubles, Floats, Indices
 
 MAX_COORDINATE = 1e9  # metres; the contract's range of a coordinate
+ROUNDING = 1e-6  # by which lengths of unit vectors in single precision differ from 1
 Numbers = npt.NDArray[np.floating]
 
 
@@ -61,15 +62,21 @@ OF_VERTEX = {
 
 
 def unit_normals(vertices: Doubles, faces: Indices, normals: Numbers) -> Floats:
-    """The file's normals at unit length; one of length zero (a vertex without any) comes from its triangles."""
+    """The file's normals at unit length; one of length zero (a vertex without any) comes from its triangles.
+
+    One of unit length already stays as it is: dividing it again would change its last bit whenever a mesh is written
+    and read."""
     missing = ~normals.any(axis=1)
     if missing.any():
         normals = normals.astype(np.float64)
         normals[missing] = _area_weighted(vertices, faces)[missing]
+    with np.errstate(over="ignore"):
+        given, is_unit = normals, np.abs(np.linalg.norm(normals.astype(np.float64), axis=1) - 1) < ROUNDING
     length = np.abs(normals).max(axis=1, keepdims=True)  # first, or a normal of 1e200 squares to infinity
     normals = normals / np.where(length > 0, length, 1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0, normals / np.where(length > 0, length, 1), (0.0, 1.0, 0.0))
+    normals = np.where(is_unit[:, None], given, normals)
     return np.ascontiguousarray(normals, np.float32)
 
 

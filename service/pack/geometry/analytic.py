@@ -80,7 +80,7 @@ class AnalyticShapes:
     def disk(
         self, center: Vec3, normal: Vec3, radius: float, matrix: np.ndarray | None, used: tuple[int, int]
     ) -> None:
-        right, up = _across(normal)
+        right, up = across(normal)
         u, v = 2 * radius * right, 2 * radius * up
         self.quad(tuple(center - (u + v) / 2), tuple(u), tuple(v), matrix, used, is_round=True)
 
@@ -123,7 +123,7 @@ class AnalyticShapes:
         return True
 
 
-def _across(normal: Vec3) -> tuple[np.ndarray, np.ndarray]:
+def across(normal: Vec3) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors to the right and up, seen from where the normal points, with +Y up; of a level disk -Z is up from
     above and +Z from below, as on a box."""
     n = np.divide(normal, math.hypot(*normal))

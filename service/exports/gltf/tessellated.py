@@ -1,0 +1,99 @@
+"""Spheres, quads, disks and boxes as triangles, with the texture coordinates that the document gives them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.assets.types import Doubles, Indices
+from service.pack.geometry.analytic import CUBE_FACES, across
+from service.scene.shape import BoxShape, DiskShape, QuadShape, SphereShape
+
+AROUND, UPWARD = 96, 48  # steps of a sphere: its outline is off by at most 0.0006 of the radius
+RIM = 96  # steps of a disk
+FACES = np.array(CUBE_FACES, float)
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+@dataclass(frozen=True)
+class Tessellated:
+    """Triangles in a space of their own; `matrix` (4, 4) leads from there to the shape's. Equal keys: equal
+    triangles."""
+
+    key: tuple[object, ...]
+    vertices: Doubles
+    faces: Indices
+    uvs: Doubles  # v pointing up
+    normals: Doubles | None  # None: flat
+    matrix: Doubles
+    kind: str
+
+
+def tessellated(shape: SphereShape | QuadShape | DiskShape | BoxShape) -> Tessellated:
+    """The shape without its transform."""
+    match shape:
+        case SphereShape():
+            return _sphere(np.array(shape.center), shape.radius)
+        case BoxShape():
+            return _box(np.array(shape.min), np.array(shape.max))
+        case QuadShape():
+            origin, u, v = (np.array(each, float) for each in (shape.origin, shape.u, shape.v))
+            vertices = origin + CORNERS[:, :1] * u + CORNERS[:, 1:] * v
+            key = ("quad", *shape.origin, *shape.u, *shape.v)
+            return Tessellated(key, vertices, _whole(HALVES), CORNERS, None, np.eye(4), "quad")
+        case DiskShape():
+            return _disk(np.array(shape.center), np.array(shape.normal), shape.radius)
+
+
+def _sphere(center: Doubles, radius: float) -> Tessellated:
+    """Rings from the south pole to the north; u = 1/2 + atan2(x, z) / (2 pi), v = 1 - acos(y) / pi. The last vertex
+    of a ring repeats the first with u = 1, and at a pole each triangle has a vertex of its own."""
+    u, v = np.meshgrid(np.arange(AROUND + 1) / AROUND, np.arange(UPWARD + 1) / UPWARD)
+    turn, rise = 2 * math.pi * (u - 0.5), math.pi * (1 - v)
+    ring = np.where((v == 0) | (v == 1), 0.0, np.sin(rise))
+    points = np.stack([np.sin(turn) * ring, np.cos(rise), np.cos(turn) * ring], axis=-1)
+    points[:, -1] = points[:, 0]
+    uvs = np.stack([u, v], axis=-1)
+    for pole in (0, -1):
+        uvs[pole, :, 0] += 0.5 / AROUND
+    j, i = np.divmod(np.arange(AROUND * UPWARD), AROUND)
+    a = j * (AROUND + 1) + i
+    b, d = a + 1, a + AROUND + 1
+    last = j == UPWARD - 1
+    lower, upper = np.stack([a, b, np.where(last, d, d + 1)], axis=1)[j > 0], np.stack([a, d + 1, d], axis=1)[~last]
+    flat = points.reshape(-1, 3)
+    matrix = np.diag([radius, radius, radius, 1.0])
+    matrix[:3, 3] = center
+    faces = _whole(np.concatenate([lower, upper]))
+    return Tessellated(("sphere",), flat, faces, uvs.reshape(-1, 2), flat, matrix, "sphere")
+
+
+def _box(low: Doubles, high: Doubles) -> Tessellated:
+    vertices = FACES[:, :1] + CORNERS[:, :1] * FACES[:, 1:2] + CORNERS[:, 1:] * FACES[:, 2:]
+    faces = np.concatenate([HALVES + 4 * k for k in range(len(FACES))])
+    matrix = np.diag([*((high - low) / 2), 1.0])
+    matrix[:3, 3] = (low + high) / 2
+    uvs = np.tile(CORNERS, (len(FACES), 1))
+    return Tessellated(("box",), vertices.reshape(-1, 3), _whole(faces), uvs, None, matrix, "box")
+
+
+def _disk(center: Doubles, normal: Doubles, radius: float) -> Tessellated:
+    """In the plane of `normal`, with the coordinates of the square around it."""
+    right, up = across((normal[0], normal[1], normal[2]))
+    turn = 2 * math.pi * np.arange(RIM) / RIM
+    rim = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    flat = np.concatenate([[[0.0, 0.0]], rim])
+    k = np.arange(RIM)
+    faces = np.stack([0 * k, 1 + k, 1 + (k + 1) % RIM], axis=1)
+    vertices = np.column_stack([flat, np.zeros(len(flat))])
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, up, np.cross(right, up)], axis=1) * radius
+    matrix[:3, 3] = center
+    return Tessellated(("disk",), vertices, _whole(faces), (flat + 1) / 2, None, matrix, "disk")
+
+
+def _whole(faces: np.ndarray) -> Indices:
+    return faces.astype(np.int32)

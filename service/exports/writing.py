@@ -1,0 +1,52 @@
+"""What a writer is given and gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from service.assets import Assets
+from service.exports.losses import Losses
+from service.problems import TooLarge
+
+
+class Files(Assets, Protocol):
+    """Assets with their bytes as they were uploaded. All methods raise AssetError, and any thread may call them."""
+
+    def read(self, ref: str) -> bytes: ...
+
+
+class Limits(Protocol):
+    """The part of the service's configuration that bounds an export."""
+
+    @property
+    def max_triangles(self) -> int: ...
+
+    @property
+    def max_texels(self) -> int: ...
+
+    @property
+    def max_asset(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file in pieces, so that a large one is never copied whole, and what it has no place for."""
+
+    pieces: Sequence[bytes | memoryview]
+    losses: Losses = field(default_factory=Losses)
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.pieces))
+
+    @property
+    def data(self) -> bytes:
+        return b"".join(self.pieces)
+
+
+def check_size(size: int, limits: Limits) -> None:
+    """Raises TooLarge for a file that could not be uploaded again."""
+    if size > limits.max_asset:
+        raise TooLarge(f"The file would have {size} bytes; {limits.max_asset} are allowed (SUNBOX_MAX_ASSET).")

@@ -1,0 +1,71 @@
+"""Files of other programs, as answers: what calls share that write one."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import BinaryIO
+
+from fastapi import Request, Response
+
+from service.exports import Exported, Format
+from service.exports.formats import Writer
+from service.http.downloads import FileAnswer
+from service.problems import InvalidDocument
+from service.routes import answers
+from service.scene import MeshShape, Scene
+from service.state import AppState, app_state, caller_of, owner_of
+from service.storage.asset_access import references
+from service.system.executors import packing
+
+TIMES = 2  # bytes that are held while a file is written, for each byte of the meshes and images in it
+LOST = {
+    "Sunbox-Lost": {
+        "description": "What the format has no place for: a JSON array of `{pointer, detail}`, `[]` where nothing is "
+        "lost. Where it would be too long for a header, equal details are told once, with their `count`.",
+        "schema": {"type": "string"},
+    }
+}
+
+
+def file_answers(*formats: Format) -> answers.Responses:
+    """The answers of a call that writes one of these formats, for the API's description."""
+    described = answers.files(*(each.media_type for each in formats))
+    return {status: {**each, "headers": LOST} for status, each in described.items()}
+
+
+async def written(
+    request: Request, scene: Scene, format: Format, writer: Writer, root: str, within: str = ""
+) -> Response:
+    """The answer with the file. `root` is a pointer to the scene in the body, and begins those of errors and losses;
+    `within` as `Losses.document` has it.
+
+    Raises InvalidDocument, TooLarge, TooManyRequests, Unavailable.
+    """
+    state, caller = app_state(request), caller_of(request)
+    exported = await packing(partial(_export, state, scene, writer, owner_of(request), root), caller)
+    headers = {
+        "content-disposition": f'attachment; filename="scene.{format.ending}"',
+        "sunbox-lost": exported.losses.header(root, within),
+        "cache-control": "no-store",
+    }
+
+    def fill(file: BinaryIO) -> None:
+        for piece in exported.pieces:
+            file.write(piece)
+
+    state.downloads.admit(caller, exported.size)
+    file = await packing(partial(state.downloads.write, fill), caller)
+    state.downloads.keep(caller, None, file)
+    return FileAnswer(file.file, format.media_type, headers, file)
+
+
+def _export(state: AppState, scene: Scene, writer: Writer, owner: str, root: str) -> Exported:
+    files = state.storage.access.files(owner, scene)
+    meshes = [shape for shape in scene.shapes if isinstance(shape, MeshShape)]
+    size = sum(map(files.size, set(references(scene))))
+    size += sum(rows.nbytes for each in meshes for rows in (each.vertices, each.faces) if rows is not None)
+    try:
+        with state.memory.held("scenes", TIMES * size):
+            return writer(scene, files, state.config)
+    except InvalidDocument as error:
+        raise error.under(root) from None
