@@ -13,7 +13,7 @@ from service.config import Config
 from service.problems import FieldError, InvalidDocument
 from service.requests.request_parser import RenderRequest, RequestParser, digest_of, folded, unfolded
 from service.scene import load_json, references
-from service.scene.axes import Axis, Variations
+from service.scene.axes import Axis, StoredAxis, Times, Variations
 from service.scene.document import Parsed
 from service.scene.validation import validated
 
@@ -26,6 +26,7 @@ class _BatchRequest(RenderRequest):
 
 _BATCH_REQUEST = TypeAdapter(_BatchRequest)
 _AXES: TypeAdapter[list[Any]] = TypeAdapter(list[Axis])
+_STORED_AXES: TypeAdapter[list[Any]] = TypeAdapter(list[StoredAxis])
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,17 @@ def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
 
 def variations(base: Any, axes: str) -> Variations:
     """Of what is stored of a batch."""
-    return Variations(base, _AXES.validate_json(axes))
+    return Variations(base, _STORED_AXES.validate_json(axes))
 
 
 def variations_of(axes: str) -> Variations:
     """The axes alone, for their names."""
     return variations({}, axes)
+
+
+def times_of(axes: str) -> dict[int, Times]:
+    """The axes of a request that are times of an animation, by their places."""
+    return {i: axis for i, axis in enumerate(_AXES.validate_json(axes)) if isinstance(axis, Times)}
 
 
 def document_of_step(body: bytes, axes: str, step: int) -> bytes:

@@ -264,7 +264,7 @@ RENDER_AGAIN: Responses = {
 }
 LASTING_RENDER_BODY = body(RENDER_SCHEMA | {"properties": RENDER_SCHEMA["properties"] | NAMED}, sphere=RENDER)
 _AXIS = {
-    "anyOf": [reference("ValuesAxis"), reference("PatchesAxis"), reference("TurntableAxis")],
+    "anyOf": [reference("ValuesAxis"), reference("PatchesAxis"), reference("TurntableAxis"), reference("TimesAxis")],
     "description": "What varies along it.",
 }
 _OVER = {"type": "array", "minItems": 1, "maxItems": MOST_AXES, "items": _AXIS}

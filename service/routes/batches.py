@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import secrets
 import time
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -13,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service import images
 from service.batches.batch import Batch
+from service.batches.posing import with_poses
 from service.config import MIB
 from service.displays import SRGB
 from service.images import animation
@@ -29,6 +31,7 @@ from service.routes.renders import IdempotencyHeader, ImageQuery, Wait, lut_of
 from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
 from service.scene.look import Lut, ToneMap, shown_as
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
+from service.system.executors import storing
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE
 
 router = APIRouter(prefix="/v1", tags=["batches"])
@@ -71,12 +74,13 @@ class AnimationQuery(Shown):
     status_code=202,
     summary="Start renders that differ along axes",
     description="Axes multiply, and the last runs fastest. Each step of each axis is validated before this answers, "
-    "the other axes being at their first; no scene is packed before its turn. Render k is, to the bit, the render of "
+    "the other axes being at their first, and glTF files are posed at each time; no scene is packed before its turn. "
+    "Render k is, to the bit, the render of "
     "its document alone. `Idempotency-Key` as for renders. A `callback` is sent once, at the batch's end.",
     openapi_extra=answers.BATCH_BODY,
     response_class=Response,
     responses=answers.shaped(answers.StartedBatch, "Its renders wait for their turns; `Location` leads to it.", 202)
-    | answers.problems(400, 409, 413, 415, 422, 429, 503),
+    | answers.problems(400, 404, 409, 413, 415, 422, 429, 503),
 )
 async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> Response:
     state, owner = app_state(request), owner_of(request)
@@ -85,6 +89,7 @@ async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> 
     parsed = await _parsed(request)
     batch = await _known(state, owner, idempotency_key, parsed)
     if batch is None:
+        parsed = await storing(partial(with_poses, parsed, state.storage, owner), caller_of(request))
         key = None if idempotency_key is None else IdempotencyKey(idempotency_key, parsed.digest)
         batch = await _started(state, owner, parsed, key)
     document = {"id": batch.id, "renders": batch.order.renders}

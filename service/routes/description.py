@@ -138,7 +138,7 @@ def _documents() -> dict[str, Any]:
 
 def _axes() -> dict[str, Any]:
     """What varies along the axes of a batch."""
-    kinds = [(kind, "validation") for kind in (axes.Values, axes.Patches, axes.Turntable)]
+    kinds = [(kind, "validation") for kind in (axes.Values, axes.Patches, axes.Turntable, axes.Times)]
     _, defined = models_json_schema(kinds, ref_template=HERE + "{model}")  # type: ignore[arg-type]
     axis = {f"{name}Axis": schema | {"title": f"{name}Axis"} for name, schema in defined["$defs"].items()}
     return axis

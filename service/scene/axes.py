@@ -17,6 +17,7 @@ from service.problems import FieldError, InvalidDocument
 from service.scene.base import Model, refusal
 from service.scene.patch import merge_patch
 
+MOST_TIMES = 500  # of an animation: each is posed before the batch is accepted
 LONGEST_NAME = 60  # characters of a step's name, in a file's name or under a picture
 
 
@@ -115,15 +116,64 @@ class Turntable(Model):
         return {**document, "scene": {**document["scene"], "camera": turned}}
 
 
+class Times(Model):
+    """A glTF file's animation at each of these times: the scene's shapes and lights of the file are posed anew."""
+
+    time: Annotated[
+        list[Annotated[float, Field(ge=-1e9, le=1e9)]],
+        Field(min_length=1, max_length=MOST_TIMES, description="s, before the start and after the end as there."),
+    ]
+    asset: Annotated[str, Field(description="The file's id.")]
+    animation: Annotated[str, Field(description="By name.")]
+
+    @property
+    def title(self) -> str:
+        return self.animation
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def label(self, step: int) -> str:
+        return f"{self.time[step]:g} s"
+
+    def name(self, step: int) -> str:
+        return self.label(step)
+
+    def pointer(self, step: int) -> str:
+        return f"/time/{step}"
+
+    def applied(self, document: dict[str, Any], step: int) -> dict[str, Any]:
+        return document  # what moves is known once the file was read
+
+
+class PosedTimes(Times):
+    """Such an axis as it is stored, of a batch that was accepted."""
+
+    # For each time the members of things that differ, by the kind of the thing and its place: {"shapes": {"3":
+    # {"asset": ...}}}. A member that is null is taken away.
+    poses: list[dict[str, dict[str, dict[str, Any]]]]
+
+    def applied(self, document: dict[str, Any], step: int) -> dict[str, Any]:
+        scene = dict(document["scene"])
+        for kind, moved in self.poses[step].items():
+            things = list(scene[kind])
+            for place, members in moved.items():
+                changed = {**things[int(place)], **members}
+                things[int(place)] = {name: value for name, value in changed.items() if value is not None}
+            scene[kind] = things
+        return {**document, "scene": scene}
+
+
 def _kind(value: Any) -> str:
     given = value if isinstance(value, dict) else getattr(value, "__dict__", {})
-    return next((kind for kind in ("patches", "turntable") if kind in given), "values")
+    return next((kind for kind in ("patches", "turntable", "time") if kind in given), "values")
 
 
-Axis = Annotated[
-    Annotated[Values, Tag("values")] | Annotated[Patches, Tag("patches")] | Annotated[Turntable, Tag("turntable")],
-    Discriminator(_kind),
-]
+_Written = (
+    Annotated[Values, Tag("values")] | Annotated[Patches, Tag("patches")] | Annotated[Turntable, Tag("turntable")]
+)
+Axis = Annotated[_Written | Annotated[Times, Tag("time")], Discriminator(_kind)]
+StoredAxis = Annotated[_Written | Annotated[PosedTimes, Tag("time")], Discriminator(_kind)]
 
 
 @dataclass(frozen=True)
@@ -131,7 +181,7 @@ class Variations:
     """The documents of a batch, numbered from 0. `base` is `{scene, settings}`."""
 
     base: dict[str, Any]
-    axes: Sequence[Values | Patches | Turntable]
+    axes: Sequence[Values | Patches | Turntable | Times]
 
     def __len__(self) -> int:
         return math.prod(map(len, self.axes))
@@ -161,7 +211,8 @@ class Variations:
         document. As many as the axes' lengths together. Raises InvalidDocument."""
         first = (0,) * len(self.axes)
         for i, axis in enumerate(self.axes):
-            for step in range(1 if isinstance(axis, Turntable) else len(axis)):  # a turn makes no camera invalid
+            # Neither a turn nor a pose makes a scene invalid.
+            for step in range(1 if isinstance(axis, Turntable | Times) else len(axis)):
                 yield f"/{i}{axis.pointer(step)}", self._at((*first[:i], step, *first[i + 1 :]))
 
     def _at(self, steps: Sequence[int]) -> dict[str, Any]:

@@ -91,8 +91,9 @@ class AsyncClient:
         **settings: Any,
     ) -> AsyncBatch:
         """Renders of a scene that varies along axes. `over`: a list of axes, `{"path": "/materials/a/roughness",
-        "values": [...]}`, `{"patches": [...], "names": [...]}` or `{"turntable": n, "degrees": 360}`; they multiply,
-        and the last runs fastest. Or a dict of paths and values, an axis for each. The others as of `submit`."""
+        "values": [...]}`, `{"patches": [...], "names": [...]}`, `{"turntable": n, "degrees": 360}` or
+        `{"time": [...], "asset": id, "animation": name}` of an uploaded glTF file; they multiply, and the last runs
+        fastest. Or a dict of paths and values, an axis for each. The others as of `submit`."""
         axes = [{"path": path, "values": values} for path, values in over.items()] if isinstance(over, dict) else over
         body = {"scene": await self._transport.uploaded(scene), "settings": settings, "over": axes}
         body |= {"priority": priority} | _given(label, callback)
