@@ -248,7 +248,7 @@ def _import(command: argparse.ArgumentParser) -> None:
 def _export(command: argparse.ArgumentParser) -> None:
     text = "a scene's JSON, a glTF, OBJ, PLY or STL model, or a PNG or EXR that Sunbox made"
     command.add_argument("input", metavar="SCENE", help=text)
-    text = "the file, whose ending says its format: .glb. What it has no place for is printed on stderr"
+    text = "the file, whose ending says its format: .glb, .mtlx. What it has no place for is printed on stderr"
     command.add_argument("-o", "--output", required=True, metavar="OUT", help=text)
     _asset_root(command)
 

@@ -23,6 +23,9 @@ def run(arguments: argparse.Namespace) -> int:
     source = read_source(Path(arguments.input), arguments.asset_root, config)
     with source_assets(source, arguments.asset_root, config) as assets, refusals(source.pointer):
         exported = FORMATS[name].scene_writer(source.scene, assets, config)
+    for path, data in exported.beside.items():
+        files.make_folder((target.parent / path).parent)
+        files.write(target.parent / path, data)
     files.write(target, exported.data)
     for loss in exported.losses.document(source.pointer):
         print(f"lost: {loss['pointer']}: {loss['detail']}", file=sys.stderr)

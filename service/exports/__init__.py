@@ -5,6 +5,7 @@ writing         what a writer is given and gives back
 saved_material  a saved material as a scene
 losses          what a format has no place for, for whoever exports
 principled      materials of every model as `principled`, with what that loses
+materialx       MaterialX: materials, with their images beside the file
 gltf            glTF 2.0: a scene as a GLB, a material as a .gltf
 """
 

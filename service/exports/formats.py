@@ -55,6 +55,9 @@ class Format:
 FORMATS: dict[str, Format] = {
     "glb": Format("model/gltf-binary", "glb", "service.exports.gltf.writer", has_scenes=True),
     "gltf": Format("model/gltf+json", "gltf", "service.exports.gltf.writer", has_materials=True),
+    "mtlx": Format(
+        "application/mtlx+xml", "mtlx", "service.exports.materialx.writer", has_scenes=True, has_materials=True
+    ),
 }
 
 

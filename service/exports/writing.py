@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -32,10 +34,12 @@ class Limits(Protocol):
 
 @dataclass(frozen=True)
 class Exported:
-    """A file in pieces, so that a large one is never copied whole, and what it has no place for."""
+    """A file in pieces, so that a large one is never copied whole, what it has no place for, and files that it names
+    by their paths beside it."""
 
     pieces: Sequence[bytes | memoryview]
     losses: Losses = field(default_factory=Losses)
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -44,6 +48,15 @@ class Exported:
     @property
     def data(self) -> bytes:
         return b"".join(self.pieces)
+
+    def zipped(self, name: str) -> Exported:
+        """One zip of the file, under this name, and those beside it, which are compressed already."""
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w") as archive:
+            archive.writestr(zipfile.ZipInfo(name), self.data, zipfile.ZIP_DEFLATED)
+            for path, data in self.beside.items():
+                archive.writestr(zipfile.ZipInfo(path), data)
+        return Exported([out.getvalue()], self.losses)
 
 
 def check_size(size: int, limits: Limits) -> None:

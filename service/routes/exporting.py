@@ -18,6 +18,7 @@ from service.storage.asset_access import references
 from service.system.executors import packing
 
 TIMES = 2  # bytes that are held while a file is written, for each byte of the meshes and images in it
+ZIP = "application/zip"  # of a file that has others beside it
 LOST = {
     "Sunbox-Lost": {
         "description": "What the format has no place for: a JSON array of `{pointer, detail}`, `[]` where nothing is "
@@ -29,7 +30,7 @@ LOST = {
 
 def file_answers(*formats: Format) -> answers.Responses:
     """The answers of a call that writes one of these formats, for the API's description."""
-    described = answers.files(*(each.media_type for each in formats))
+    described = answers.files(*(each.media_type for each in formats), ZIP)
     return {status: {**each, "headers": LOST} for status, each in described.items()}
 
 
@@ -43,8 +44,12 @@ async def written(
     """
     state, caller = app_state(request), caller_of(request)
     exported = await packing(partial(_export, state, scene, writer, owner_of(request), root), caller)
+    media_type, ending = format.media_type, format.ending
+    if exported.beside:
+        exported = await packing(partial(exported.zipped, f"scene.{ending}"), caller)
+        media_type, ending = ZIP, "zip"
     headers = {
-        "content-disposition": f'attachment; filename="scene.{format.ending}"',
+        "content-disposition": f'attachment; filename="scene.{ending}"',
         "sunbox-lost": exported.losses.header(root, within),
         "cache-control": "no-store",
     }
@@ -56,7 +61,7 @@ async def written(
     state.downloads.admit(caller, exported.size)
     file = await packing(partial(state.downloads.write, fill), caller)
     state.downloads.keep(caller, None, file)
-    return FileAnswer(file.file, format.media_type, headers, file)
+    return FileAnswer(file.file, media_type, headers, file)
 
 
 def _export(state: AppState, scene: Scene, writer: Writer, owner: str, root: str) -> Exported:

@@ -1,0 +1,151 @@
+"""Materials as MaterialX: read in again they are the same materials, and what they lose is told."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.assets import AssetStore
+from service.assets.materialx.importer import read_materialx
+from service.assets.types import AssetLimits, SceneFile
+from service.cli import main
+from service.config import Config
+from service.exports import FORMATS, Exported
+from service.scene import parse_scene
+from tests.asset_files import png
+from tests.serving import Server
+
+mx = pytest.importorskip("MaterialX")
+
+IMAGE = png(np.random.default_rng(5).integers(0, 256, (8, 8, 4)).astype(np.uint8))
+LOOK = {"version": 1, "camera": {"position": [0, 0, 4], "target": [0, 0, 0]}, "shapes": []}
+FULL: dict[str, Any] = {
+    "type": "principled", "base_color": [0.8, 0.4, 0.2], "metallic": 0.25, "roughness": 0.35, "ior": 1.7,
+    "anisotropic": 0.5, "sheen": 0.3, "sheen_color": [1.0, 0.5, 0.25], "sheen_roughness": 0.6, "clearcoat": 0.5,
+    "clearcoat_roughness": 0.05, "emission": [2.0, 4.0, 1.0], "alpha": 0.5,
+}  # fmt: skip
+GLASS = {
+    "type": "principled", "base_color": 1.0, "roughness": 0.1, "ior": 1.33, "transmission": 1.0,
+    "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125,
+}  # fmt: skip
+TINTED = {"type": "principled", "base_color": [0.2, 0.1, 0.9], "roughness": 0.2, "transmission": 1.0}
+TEXTURES = {
+    "coat": {"asset": "", "color_space": "srgb", "wrap": "mirror", "scale": [2.0, -4.0], "rotation": 30.0,
+             "offset": [0.25, 0.5]},
+    "data": {"asset": "", "color_space": "linear"},
+}  # fmt: skip
+TEXTURED = {
+    "type": "principled", "base_color": {"texture": "coat", "factor": [0.5, 1.0, 0.25]},
+    "roughness": {"texture": "data", "channel": "g", "factor": 0.5}, "metallic": {"texture": "data", "channel": "b"},
+    "alpha": {"texture": "data", "channel": "a"}, "normal_map": {"texture": "data", "scale": 0.5},
+    "emission": {"texture": "coat", "factor": 3.0},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
+    store = AssetStore(tmp_path_factory.mktemp("data"))
+    yield store
+    store.close()
+
+
+def written(store: AssetStore, materials: dict[str, Any], textures: dict[str, Any] | None = None) -> Exported:
+    asset = store.add(IMAGE).id
+    named = {name: {**each, "asset": asset} for name, each in (textures or {}).items()}
+    scene = parse_scene({**LOOK, "materials": materials, "textures": named})
+    exported = FORMATS["mtlx"].material_writer(scene, store, Config())
+    document = mx.createDocument()
+    mx.readFromXmlString(document, exported.data.decode())
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    document.setDataLibrary(library)
+    assert document.validate()[0], document.validate()[1]
+    return exported
+
+
+def again(exported: Exported) -> SceneFile:
+    files = {"a.mtlx": exported.data, **exported.beside}
+    return read_materialx(list(files), files.__getitem__, AssetLimits())
+
+
+def same(found: Any, wanted: Any) -> None:
+    assert found.keys() == wanted.keys()
+    for name, value in wanted.items():
+        if isinstance(value, dict):
+            same(found[name], value)
+        else:
+            assert found[name] == (value if isinstance(value, str) else pytest.approx(value, rel=2e-6)), name
+
+
+@pytest.mark.parametrize("material", [FULL, GLASS, TINTED], ids=["all", "glass", "tinted"])
+def test_a_material_is_the_same_when_it_is_read_again(store: AssetStore, material: dict[str, Any]) -> None:
+    exported = written(store, {"m": material})
+    assert not list(exported.losses)
+    file = again(exported)
+    same(file.document["materials"]["m"], material)
+    assert not file.warnings
+
+
+def test_textures_keep_their_bytes_and_where_they_lie(store: AssetStore) -> None:
+    exported = written(store, {"m": TEXTURED}, TEXTURES)
+    assert not list(exported.losses) and list(exported.beside.values()) == [IMAGE]
+    file = again(exported)
+    names = {value["texture"] for value in file.document["materials"]["m"].values() if isinstance(value, dict)}
+    by_scale = {len(file.document["textures"][name]): name for name in names}
+    renamed = {"data": by_scale[2], "coat": by_scale[6]}
+    wanted = json.loads(json.dumps(TEXTURED))
+    for value in wanted.values():
+        if isinstance(value, dict):
+            value["texture"] = renamed[value["texture"]]
+    same(file.document["materials"]["m"], wanted)
+    for name, texture in TEXTURES.items():
+        same(file.document["textures"][renamed[name]], {**texture, "asset": "part:0"})
+
+
+def test_the_model_that_loses_less_is_taken_and_the_rest_is_told(store: AssetStore) -> None:
+    turned = {**FULL, "anisotropic_rotation": 90.0, "subsurface": 0.5}
+    exported = written(store, {"brushed metal": turned, "plain": FULL})
+    assert b"<standard_surface" in exported.data and b"<open_pbr_surface" in exported.data
+    assert {pointer for pointer, _ in exported.losses} == {
+        "/materials/brushed metal", "/materials/brushed metal/subsurface",
+    }  # fmt: skip
+    wanted = {name: value for name, value in turned.items() if name != "subsurface"}
+    same(again(exported).document["materials"]["brushed_metal"], wanted)
+    other = written(store, {"m": {"type": "diffuse", "albedo": 0.5}})
+    assert "/materials/m/type" in {pointer for pointer, _ in other.losses}
+
+
+def test_it_is_served_and_written_by_the_command(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    server.http.put("/v1/documents/materials/full", json=FULL)
+    plain = server.http.get("/v1/documents/materials/full?format=mtlx")
+    assert plain.headers["content-type"] == "application/mtlx+xml" and plain.headers["sunbox-lost"] == "[]"
+    assert b'<surfacematerial name="full"' in plain.content
+    asset = server.http.post("/v1/assets", content=IMAGE).json()["id"]
+    textures = {name: {**each, "asset": asset} for name, each in TEXTURES.items()}
+    scene = {**LOOK, "materials": {"m": TEXTURED}, "textures": textures}
+    scene["shapes"] = [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}]
+    answer = server.http.post("/v1/export", json={"scene": scene, "format": "mtlx"})
+    assert answer.headers["content-type"] == "application/zip"
+    assert [loss["pointer"] for loss in json.loads(answer.headers["sunbox-lost"])] == ["/scene/shapes/0"]
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.namelist() == ["scene.mtlx", "textures/coat.png"]
+    taken = server.http.post("/v1/assets", content=answer.content).json()
+    assert taken["kind"] == "materials" and not taken["warnings"]
+
+    monkeypatch.setenv("SUNBOX_DATA_DIR", str(tmp_path / "data"))
+    (tmp_path / "a.png").write_bytes(IMAGE)
+    scene["textures"] = {name: {**each, "asset": "a.png"} for name, each in TEXTURES.items()}
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    assert main(["export", str(tmp_path / "scene.json"), "-o", str(tmp_path / "out.mtlx")]) == 0
+    assert "lost: /shapes/0: MaterialX has materials only" in capsys.readouterr().err
+    assert (tmp_path / "textures" / "coat.png").read_bytes() == IMAGE
+    assert main(["import", str(tmp_path / "out.mtlx"), "-o", str(tmp_path / "again.json")]) == 0
