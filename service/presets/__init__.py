@@ -5,6 +5,7 @@ measured; none of them is part of the document. A material that shows textures i
 A stage is what things stand on: materials and shapes that it adds to a scene whose thing stands on the origin.
 `"builtin:NAME"` in it stands for an asset of `generated`.
 
+physically_based  materials of the Physically Based database
 generated      the assets that presets use
 field          a thousand spheres
 disney_charts  spheres that show what each parameter of `disney` does
@@ -26,6 +27,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from service.presets import physically_based
 from service.presets.disney_charts import parameter_grid, parameter_rows
 from service.presets.field import sphere_field
 from service.presets.generated import ASSETS, asset, asset_id
@@ -43,13 +45,16 @@ COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
 
 
 def names(kind: str) -> list[dict[str, str]]:
-    """`[{name, title}]`, of materials with their `kind`, in the order of the titles. Raises NotFound."""
+    """`[{name, title}]`, of materials with their `kind` and, where numbers were measured, their `source`.
+
+    In the order of the titles; the database's materials come last. Raises NotFound.
+    """
     titled = [{"name": name} | _heading(_titled(kind, name)) for name in _known(kind)]
-    return sorted(titled, key=lambda entry: entry["title"])
+    return sorted(titled, key=lambda entry: (entry.get("kind") == physically_based.KIND, entry["title"]))
 
 
 def _heading(stored: dict[str, Any]) -> dict[str, str]:
-    return {key: stored[key] for key in ("title", "kind") if key in stored}
+    return {key: stored[key] for key in ("title", "kind", "source") if key in stored}
 
 
 def get(kind: str, name: str) -> dict[str, Any]:
@@ -76,13 +81,16 @@ def _known(kind: str) -> tuple[str, ...]:
     if kind not in KINDS:
         raise NotFound(f"there are no presets of {kind[:80]!r}; there are {', '.join(KINDS)}")
     stored = [entry.name.removesuffix(".json") for entry in files(__name__).joinpath(kind).iterdir()]
-    return tuple(sorted(stored + [name for computed, name in COMPUTED if computed == kind]))
+    more = list(physically_based.materials()) if kind == "materials" else []
+    return tuple(sorted(stored + more + [name for computed, name in COMPUTED if computed == kind]))
 
 
 @cache
 def _titled(kind: str, name: str) -> dict[str, Any]:
     if (kind, name) in COMPUTED:
         return COMPUTED[kind, name]()
+    if kind == "materials" and name in physically_based.materials():
+        return physically_based.materials()[name]
     document: dict[str, Any] = json.loads(files(__name__).joinpath(kind, f"{name}.json").read_text("utf-8"))
     return document
 

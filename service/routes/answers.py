@@ -65,7 +65,12 @@ class Named(BaseModel):
 
 
 class NamedPreset(Named):
-    kind: str | None = Field(None, description="Of a material: metal, plastic, glass, stone, cloth, organic, light.")
+    kind: str | None = Field(
+        None,
+        description="Of a material: metal, plastic, glass, stone, cloth, organic, light; database: one of the "
+        "Physically Based database.",
+    )
+    source: str | None = Field(None, description="Who measured a material's numbers, where they were measured.")
 
 
 class RendererPlace(BaseModel):

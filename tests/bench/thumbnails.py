@@ -15,6 +15,7 @@ from urllib.request import Request, urlopen
 
 from service import presets
 from service.bench.latency import server
+from service.presets import physically_based
 
 FOLDER = Path(__file__).resolve().parents[2] / "web" / "thumbnails"
 SETTINGS = {
@@ -57,11 +58,12 @@ def picture(kind: str, name: str) -> Path:
 
 
 def wanted() -> dict[str, dict[str, str]]:
-    """The fingerprints of all presets, by kind and name."""
-    return {
-        kind: {name: fingerprint(scene(kind, name)) for name in (each["name"] for each in presets.names(kind))}
+    """The fingerprints of the presets, by kind and name. Browsers ask for those of a database when they are seen."""
+    names = {
+        kind: [each["name"] for each in presets.names(kind) if each.get("kind") != physically_based.KIND]
         for kind in SETTINGS
     }
+    return {kind: {name: fingerprint(scene(kind, name)) for name in every} for kind, every in names.items()}
 
 
 def run() -> int:

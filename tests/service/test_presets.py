@@ -17,7 +17,7 @@ from gpu import Renderer, RenderSettings
 from service import presets
 from service.assets import AssetStore
 from service.pack import pack
-from service.presets import latlong
+from service.presets import latlong, physically_based
 from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
 from service.scene import check_saved_material, parse_scene
@@ -71,8 +71,8 @@ def test_every_preset_is_valid_and_its_assets_are_there(kind: str, name: str) ->
 def test_lists_have_titles(kind: str) -> None:
     entries = presets.names(kind)
     members = {"name", "title"} | ({"kind"} if kind == "materials" else set())
-    assert all(set(entry) == members and all(entry.values()) for entry in entries)
-    assert len({entry["title"] for entry in entries}) == len(entries)
+    assert all(set(entry) - {"source"} == members and all(entry.values()) for entry in entries)
+    assert len({(entry["title"], entry.get("kind")) for entry in entries}) == len(entries)
 
 
 def test_there_is_enough_to_choose_from() -> None:
@@ -82,6 +82,25 @@ def test_there_is_enough_to_choose_from() -> None:
               "disney-grid"}  # fmt: skip
     assert wanted <= set(SCENES)
     assert len(presets.names("materials")) >= 24 and len(presets.names("environments")) >= 6
+
+
+def test_the_database_says_where_it_comes_from() -> None:
+    data = physically_based.database()
+    assert data["license"].startswith("CC0") and "physicallybased.info" in data["source"] and data["version"]
+    mine = [entry for entry in presets.names("materials") if entry["kind"] == physically_based.KIND]
+    assert len(mine) == len(data["materials"]) == 110
+    assert all("(CC0)" in entry["source"] and ": " in entry["source"] for entry in mine)
+    assert all(reference["url"] for entry in data["materials"] for reference in entry["references"])
+
+
+def test_the_database_s_numbers_are_the_presets_numbers() -> None:
+    """A metal has its reflectance, in 0..1; light in wine falls off at its rates, of 1/cm."""
+    gold = presets.get("materials", "physically-based-gold")
+    assert gold["metallic"] == 1 and gold["base_color"] == [1, 0.773, 0.307]
+    wine = presets.get("materials", "physically-based-wine-red")
+    rates = -np.log(wine["attenuation_color"]) / wine["attenuation_distance"]
+    assert rates / 100 == pytest.approx([1.1632, 2.5191, 2.9434], rel=1e-3)
+    assert presets.get("materials", "physically-based-brick")["base_color"] == [0.262, 0.095, 0.061]
 
 
 METALS = {"gold", "silver", "copper", "aluminium", "brushed-aluminium", "iron", "titanium", "chrome", "nickel",

@@ -32,6 +32,16 @@ function fetchWhenSeen(image, name) {
   image.src = beside(name).href;
 }
 
+// Calls `then` once, when the image comes into sight.
+function onceSeen(image, then) {
+  const watch = new IntersectionObserver((seen) => {
+    if (!seen.some(({ isIntersecting }) => isIntersecting)) return;
+    watch.disconnect();
+    then();
+  });
+  watch.observe(image);
+}
+
 const hash = async (document) => {
   const digest = await crypto.subtle.digest("SHA-256", new TextEncoder().encode(JSON.stringify(document)));
   return [...new Uint8Array(digest.slice(0, 12))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
@@ -76,7 +86,7 @@ export class Thumbnails {
   // The picture of a material preset, or of what `get` gives where there is none.
   async preset(image, name, get) {
     if (await this.#has("materials", name)) fetchWhenSeen(image, `${encodeURIComponent(name)}.webp`);
-    else this.#queue.push({ image, get });
+    else onceSeen(image, () => this.later(image, get));
   }
 
   // The picture of a scene or an environment, of which only presets have one.

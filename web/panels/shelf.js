@@ -96,7 +96,13 @@ export class Shelf {
     this.shown.fill(
       [
         ...saved.map(({ name, title }) => ({ value: `${SAVED} ${name}`, title, label: title })),
-        ...presets.map(({ name, title, kind }) => ({ value: name, title, kind, label: short(title) })),
+        ...presets.map(({ name, title, kind, source }) => ({
+          value: name,
+          title,
+          kind,
+          label: short(title),
+          hint: source ? `${title}. ${source}` : title,
+        })),
       ].filter(({ title, kind = "" }) => `${title} ${kind}`.toLowerCase().includes(words)),
       (image, value) => {
         const fetch = () => this.#fetch(value);
