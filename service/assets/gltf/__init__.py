@@ -12,7 +12,6 @@ accessors             accessors -> arrays
 draco                 meshes that are compressed with KHR_draco_mesh_compression
 meshopt_views         buffer views that are compressed with EXT_ or KHR_meshopt_compression
 nodes                 nodes and their transforms
-placements            the transforms of all meshes, for the camera and the metering
 primitives            primitives -> triangles with normals, colours and texture coordinates
 deform                morph targets and skins, in the pose of the nodes
 animations            the pose of the nodes at one time of an animation
@@ -26,5 +25,4 @@ ktx2_images           images of KHR_texture_basisu as PNG files
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
 lights_and_camera     lights and cameras -> the document's
-metering              the exposure that suits a file
 """

@@ -8,20 +8,21 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
-from service.assets.gltf import animations, lights_and_camera, metering, variants
+from service.assets.gltf import animations, lights_and_camera, variants
 from service.assets.gltf.deform import Skin, morphed, weights
 from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.extensions import note_unsupported
 from service.assets.gltf.json_view import JsonView, whole
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
-from service.assets.gltf.placements import Part, Placements
 from service.assets.gltf.primitives import Primitive, own_notes, read_primitive
 from service.assets.gltf.textures import Textures
 from service.assets.readers.raw_mesh import MAX_COORDINATE
+from service.assets.scenes import metering
 from service.assets.scenes.framing import framed
 from service.assets.scenes.names import LONGEST
 from service.assets.scenes.part_files import PartFiles
+from service.assets.scenes.placements import Part, Placements
 from service.assets.scenes.ply_writer import ply
 from service.assets.scenes.room import stand_inside
 from service.assets.scenes.warnings import Warnings
@@ -113,7 +114,7 @@ class _Importer:
             part = self._part(place, morph, skin, node)
             if part is not None:
                 name = f"{path}/{part.shape['material']}" if path and len(primitives) > 1 else path
-                self.placements.add(part, node, worlds, name)
+                self.placements.add(part, node.place.pointer, worlds, name)
 
     def _part(self, place: JsonView, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
         """The part of one primitive in one pose; a skinned one belongs to its node alone."""

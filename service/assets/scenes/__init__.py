@@ -2,6 +2,8 @@
 
 part_files  meshes and images that become assets of their own, equal ones once
 ply_writer  a mesh as a PLY file, for the store
+placements  the transforms of all meshes, for the camera and the metering
+metering    the exposure that suits a file's lights
 framing     a camera that shows everything
 room        a camera inside of closed rooms
 rays        rays against a file's triangles

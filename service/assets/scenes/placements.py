@@ -10,8 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from service.assets.errors import ParseError
-from service.assets.gltf.document import Array
-from service.assets.gltf.nodes import Node
 from service.assets.readers.raw_mesh import MAX_COORDINATE
 from service.assets.scenes.framing import Bounds
 from service.assets.scenes.rays import Placed
@@ -24,10 +22,10 @@ LEAST_VOLUME = 1e-7  # least volume of the axes at length one that service.scene
 
 @dataclass(frozen=True)
 class Part:
-    """A primitive in one pose, written once for all its nodes."""
+    """A mesh with one material in one pose, written once for all the places where it stands."""
 
     shape: dict[str, Any]  # without its transform
-    vertices: Array  # (n, 3)
+    vertices: npt.NDArray[Any]  # (n, 3) floating
     faces: Indices  # (m, 3)
 
     @property
@@ -44,17 +42,17 @@ class Placements:
 
     def __init__(self) -> None:
         self._parts: list[Part] = []
-        self._nodes: list[Node] = []
+        self._pointers: list[str] = []
         self._matrices: list[Doubles] = []
         self._names: list[str] = []
 
-    def add(self, part: Part, node: Node, worlds: Doubles, name: str) -> None:
-        """Add `part` under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError where there are too
-        many."""
+    def add(self, part: Part, pointer: str, worlds: Doubles, name: str) -> None:
+        """Add `part` under each of `worlds` (k, 4, 4); `pointer` says which node of the file they are. Raises
+        ParseError where there are too many."""
         if len(self._parts) + len(worlds) > MOST_SHAPES:
             raise ParseError(f"the scene has more than the {MOST_SHAPES} primitives allowed, counted in each node")
         self._parts += [part] * len(worlds)
-        self._nodes += [node] * len(worlds)
+        self._pointers += [pointer] * len(worlds)
         self._matrices.extend(worlds)
         self._names += [name] * len(worlds)
 
@@ -66,9 +64,7 @@ class Placements:
         for k, (part, name) in enumerate(zip(self._parts, self._names, strict=True)):
             named = {"name": name} if name else {}
             if not stands[k]:
-                notes.leave_out(
-                    self._nodes[k].place.pointer, "the node's transform makes its mesh flat; it is left out"
-                )
+                notes.leave_out(self._pointers[k], "the node's transform makes its mesh flat; it is left out")
             elif moves[k]:
                 found.append({**named, **part.shape, "transform": {"matrix": matrices[k]}})
             else:
@@ -84,7 +80,7 @@ class Placements:
         """The shapes for rays to hit."""
         worlds = self._worlds[self._stands]
         return [
-            Placed(part.vertices, part.faces, world, part.shape["double_sided"], part.shape["material"])
+            Placed(part.vertices, part.faces, world, part.shape.get("double_sided", True), part.shape["material"])
             for part, world in zip(self.shown, worlds, strict=True)
         ]
 
@@ -103,7 +99,7 @@ class Placements:
         worlds = np.array(self._matrices).reshape(-1, 4, 4)
         beyond = ~(np.abs(worlds).max(axis=(1, 2), initial=0) <= MAX_COORDINATE)  # also where it is not a number
         if beyond.any():
-            pointer = self._nodes[int(beyond.argmax())].place.pointer
+            pointer = self._pointers[int(beyond.argmax())]
             raise ParseError("the node's matrix in the world is not finite or has a number beyond 1e9", pointer)
         return worlds
 
