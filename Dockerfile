@@ -5,6 +5,7 @@
 #   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
 # With Ray, for the nodes of a cluster (docs/scaling.md):
 #   docker build --build-arg LOCK=ray -t sunbox-ray .
+# With USD files: docker build --build-arg LOCK=usd -t sunbox-usd .
 # Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22. By digest,
 # as a tag may become another image; Dependabot proposes the next one.
 
@@ -12,7 +13,7 @@ FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eeba
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
-COPY requirements.serve.lock requirements.ray.lock requirements.build.lock ./
+COPY requirements.serve.lock requirements.ray.lock requirements.usd.lock requirements.build.lock ./
 ARG LOCK=serve
 RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r "requirements.${LOCK}.lock"
 COPY pyproject.toml README.md ./

@@ -234,8 +234,8 @@ def _import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "model",
         metavar="MODEL",
-        help="a .glb, .ply or .stl; a .gltf or .obj with its files beside it; a .zip of an .obj and its files; or a "
-        ".zip or a folder of textures whose names say what they are",
+        help="a .glb, .ply, .stl or .usdz; a .gltf or .obj with its files beside it; a .zip of an .obj and its "
+        "files; or a .zip or a folder of textures whose names say what they are",
     )
     text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
     command.add_argument("-o", "--output", required=True, metavar="SCENE.json", help=text)

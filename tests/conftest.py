@@ -43,7 +43,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for marker, package in (("ray", "ray"), ("notebook", "jupyterlab")):
+    for marker, package in (("ray", "ray"), ("notebook", "jupyterlab"), ("usd", "pxr")):
         if importlib.util.find_spec(package) is None and not os.environ.get("CI"):
             reason = f"{package} is not installed: .venv/bin/pip install -r requirements.{marker}.lock"
             for item in items:

@@ -116,6 +116,16 @@ def test_the_notebook_is_tested_with_what_is_locked() -> None:
     assert {name: everything.get(name, pin) for name, pin in notebook.items()} == notebook
 
 
+def test_usd_is_tested_with_what_is_locked() -> None:
+    """CI installs this lock, too, into the same environment; an image can be built from it."""
+    everything, usd, serve = (
+        dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
+        for name in ("requirements.lock", "requirements.usd.lock", "requirements.serve.lock")
+    )
+    assert "usd-core" in usd and "usd-core" not in everything and serve.items() <= usd.items()
+    assert {name: everything.get(name, pin) for name, pin in usd.items()} == usd
+
+
 def test_the_image_with_ray_has_what_was_tested() -> None:
     """CI installs both locks into one environment."""
     pins = [

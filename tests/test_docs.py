@@ -34,7 +34,7 @@ def test_links_lead_to_files(page: Path) -> None:
 def test_every_shipped_package_is_in_the_notices() -> None:
     notices = (ROOT / "docs" / "notices.md").read_text()
     listed = {_normal(name) for name in re.findall(r"^\| ([\w.-]+) \| \w", notices, re.MULTILINE)}
-    for lock in ("requirements.serve.lock", "requirements.ray.lock"):
+    for lock in ("requirements.serve.lock", "requirements.ray.lock", "requirements.usd.lock"):
         locked = re.findall(r"^([a-z0-9][\w.-]*)==", (ROOT / lock).read_text(), re.MULTILINE)
         assert locked and {_normal(name) for name in locked} <= listed
 

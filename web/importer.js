@@ -1,5 +1,5 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, several of one set a material, as MaterialX does, glTF and zipped OBJ a scene, JSON what it says.
+// images textures, several of one set a material, as MaterialX does, glTF, USD and zipped OBJ a scene, JSON what it says.
 
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";

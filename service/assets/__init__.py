@@ -19,6 +19,7 @@ sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF
 obj           the importer of OBJ files with materials and textures
+usd           the importer of USD
 texture_sets  the importer of images that make materials by their names
 materialx     the importer of MaterialX
 scenes        parts that the importers of whole scenes share

@@ -15,6 +15,7 @@ PACKAGES: dict[str, tuple[str, str]] = {
     "meshopt": ("meshopt", "meshopt"),
     "ktx2": ("opengl-basisu", "opengl_basisu"),
     "mtlx": ("sunbox-server[materialx]", "MaterialX"),
+    "usd": ("sunbox-server[usd]", "pxr"),
 }
 
 KINDS: dict[str, Kind] = {
@@ -25,6 +26,7 @@ KINDS: dict[str, Kind] = {
     "gltf": "scene",
     "zip": "scene",  # or "materials", by what is in it
     "mtlx": "materials",
+    "usd": "scene",
     "exr": "image",
     "hdr": "image",
     "png": "image",
@@ -32,6 +34,9 @@ KINDS: dict[str, Kind] = {
     "webp": "image",
     "cube": "lut",
 }
+
+CRATE, USD_TEXT = b"PXR-USDC", b"#usda"
+USD_LAYERS = (".usd", ".usda", ".usdc")  # the first file of a .usdz is one of these
 
 MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -41,6 +46,8 @@ MAGIC = (
     (b"#?RGBE", "hdr"),
     (b"glTF", "glb"),
     (b"PK\x03\x04", "zip"),
+    (CRATE, "usd"),
+    (USD_TEXT, "usd"),
     (b"ply\n", "ply"),
     (b"ply\r", "ply"),
 )
@@ -54,6 +61,9 @@ CONTENT_TYPES = {
     "application/sla": "stl",
     "model/gltf-binary": "glb",
     "model/gltf+json": "gltf",
+    "model/vnd.usd+zip": "usd",
+    "model/vnd.usdz+zip": "usd",
+    "model/vnd.usda": "usd",
     "application/zip": "zip",
     "application/x-zip-compressed": "zip",
     "application/mtlx+xml": "mtlx",
@@ -67,7 +77,7 @@ CONTENT_TYPES = {
     "image/webp": "webp",
 }
 
-SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr"}
+SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr", "usda": "usd", "usdc": "usd"}
 
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
@@ -104,7 +114,7 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
     head = data[:65536]
     for magic, name in MAGIC:
         if head.startswith(magic):
-            return name
+            return "usd" if name == "zip" and _is_usdz(head) else name
     if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
         return "webp"
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):
@@ -124,3 +134,9 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
     if named in CONTENT_TYPES:
         return CONTENT_TYPES[named]
     return SUFFIXES.get((filename or "").rpartition(".")[2].lower())
+
+
+def _is_usdz(head: bytes) -> bool:
+    """Whether the first file of a zip is a layer of USD, as the format demands."""
+    name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
+    return name.decode("utf-8", "replace").lower().endswith(USD_LAYERS)

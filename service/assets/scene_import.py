@@ -64,8 +64,12 @@ class Imported:
 
     def references(self) -> set[str]:
         """The assets that the document needs."""
-        parts = [*self.document["shapes"], *self.document.get("textures", {}).values()]
-        return {one["asset"] for one in parts}
+        parts = [
+            *self.document["shapes"],
+            *self.document.get("textures", {}).values(),
+            self.document.get("environment", {}),
+        ]
+        return {one["asset"] for one in parts if "asset" in one}
 
 
 def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
@@ -80,7 +84,9 @@ def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
             raise AssetError(f"{part.pointer}: {error.detail}", part.pointer) from None
 
     def renamed(one: dict[str, Any]) -> dict[str, Any]:
-        found = PART.fullmatch(str(one.get("asset")))
+        if "asset" not in one:  # a shape or an environment that is in the document itself
+            return one
+        found = PART.fullmatch(str(one["asset"]))
         if found is None or int(found[1]) >= len(ids):
             raise AssetError("its parts can't be told apart")
         return {**one, "asset": ids[int(found[1])]}
@@ -90,6 +96,8 @@ def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
         "textures": {name: renamed(one) for name, one in file.document.get("textures", {}).items()},
         "shapes": [renamed(one) for one in file.document["shapes"]],
     }
+    if "environment" in document:
+        document["environment"] = renamed(document["environment"])
     try:
         parse_scene(document)
     except InvalidDocument as error:

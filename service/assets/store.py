@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
-    "make materials by their names; MaterialX; "
+    "make materials by their names; USD; MaterialX; "
     "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours"
 )
 NO_SCENES: dict[Kind, str] = {

@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     data = zipped_images(source) if source.is_dir() else files.read(source)
     if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         raise BadInput(
-            f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip, nor a folder of textures"
+            f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, USD, nor a zip, nor a folder of textures"
         )
     if arguments.time is not None and arguments.animation is None:
         raise BadInput("--time: needs --animation beside it")

@@ -1,5 +1,5 @@
-"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY or
-an STL; and materials, a .mtlx with its images beside it.
+"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY, an
+STL or a USD file; and materials, a .mtlx with its images beside it.
 
 The importer always reads one file: a .gltf with its files inlined, an OBJ or a .mtlx and its files as a zip.
 """
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from service.assets.types import Pose
 
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip", ".mtlx")
-WHOLE = ("glb", "zip", "ply", "stl")  # formats that are one file
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip", ".mtlx", ".usd", ".usda", ".usdc", ".usdz")
+WHOLE = ("glb", "zip", "ply", "stl", "usd")  # formats that are one file
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 

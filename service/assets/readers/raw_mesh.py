@@ -69,7 +69,7 @@ def unit_normals(vertices: Doubles, faces: Indices, normals: Numbers) -> Floats:
     missing = ~normals.any(axis=1)
     if missing.any():
         normals = normals.astype(np.float64)
-        normals[missing] = _area_weighted(vertices, faces)[missing]
+        normals[missing] = area_weighted(vertices, faces)[missing]
     with np.errstate(over="ignore"):
         given, is_unit = normals, np.abs(np.linalg.norm(normals.astype(np.float64), axis=1) - 1) < ROUNDING
     length = np.abs(normals).max(axis=1, keepdims=True)  # first, or a normal of 1e200 squares to infinity
@@ -88,7 +88,7 @@ def unit_colors(colors: Numbers, warnings: list[str]) -> Floats:
     return np.ascontiguousarray(np.clip(colors, 0, 1), np.float32)
 
 
-def _area_weighted(vertices: Doubles, faces: Indices) -> Doubles:
+def area_weighted(vertices: Doubles, faces: Indices) -> Doubles:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     weighted = np.cross(b - a, c - a)
     sums = [sum(np.bincount(faces[:, k], weighted[:, axis], len(vertices)) for k in range(3)) for axis in range(3)]

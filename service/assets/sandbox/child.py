@@ -83,6 +83,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.readers.rendered import parse_rendered
     from service.assets.sandbox.parse_mesh import parse_mesh
+    from service.assets.sandbox.parse_usd import read_usd_scene
     from service.assets.sandbox.parse_zip import parse_mtlx, parse_zip
 
     size = os.fstat(source).st_size
@@ -99,6 +100,8 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
         return parse_mesh(format, mapped, limits)
     if format == "mtlx":
         return parse_mtlx(mapped, limits)
+    if format == "usd":
+        return read_usd_scene(mapped, limits)
     return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits, pose)
 
 

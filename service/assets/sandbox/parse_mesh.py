@@ -9,6 +9,7 @@ from service.assets.formats import text
 from service.assets.readers.mesh_checks import mesh_oddities
 from service.assets.readers.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
 from service.assets.readers.stl import read_stl
+from service.assets.sandbox.parse_usd import read_usd_mesh
 from service.assets.types import AssetLimits, Floats, Indices, MeshData
 
 
@@ -71,4 +72,5 @@ READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "gltf": _gltf,
     "zip": _zip,
     "mtlx": _mtlx,
+    "usd": read_usd_mesh,
 }

@@ -36,6 +36,7 @@ log = logging.getLogger(__name__)
 # RGBA, thrice); and a byte of a mesh file: 42 were seen for an OBJ of one-letter words, 9 for one of a million
 # triangles with normals, so a big file gets less for each.
 BASE_BYTES = 512 << 20
+USD_BYTES = 1 << 30  # more for a USD file: 570 MB were seen for the library's code, 440 MB for its threads' heaps
 BYTES_PER_TEXEL = 48
 BYTES_PER_MESH_BYTE, BYTES_PER_BIG_MESH_BYTE, BIG_MESH_BYTES = 64, 12, 4 << 30
 # That OBJ is read at 0.05 s a megabyte; for a slower machine under load.
@@ -137,6 +138,7 @@ class Sandbox:
             if format == "zip":
                 size = min(USUAL_RATIO * size, self.limits.max_file)
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
+            worst += USD_BYTES if format == "usd" else 0
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)
         caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}

@@ -1,0 +1,98 @@
+"""Shaders' inputs, and what they lead to: a value, or the output of another shader."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pxr import Gf, Sdf, Usd, UsdShade, Vt
+
+MOST_STEPS = 64  # nodes in a row between a parameter and its image
+
+
+@dataclass(frozen=True)
+class Node:
+    """A shader, and which of its outputs is used."""
+
+    shader: UsdShade.Shader
+    output: str
+    time: Usd.TimeCode
+
+    @property
+    def kind(self) -> str:
+        """The node's name in its library: UsdUVTexture, ND_image_color3."""
+        return str(self.shader.GetIdAttr().Get() or "")
+
+    @property
+    def pointer(self) -> str:
+        return str(self.shader.GetPath())
+
+    def at(self, name: str) -> str:
+        return f"{self.pointer}.inputs:{name}"
+
+    def has(self, name: str) -> bool:
+        """Whether the file says anything about an input."""
+        found = self.shader.GetInput(name)
+        return bool(found) and (found.GetAttr().HasAuthoredValue() or found.HasConnectedSource())
+
+    def input(self, name: str, default: Any = None) -> Any:
+        """An input: a Node where it is connected to one, else a value: numbers as floats, or a tuple of them."""
+        found = self.shader.GetInput(name)
+        return follow(found, self.time, default) if found else default
+
+    def value(self, name: str, default: Any = None) -> Any:
+        """The value of an input that only a constant makes sense for."""
+        found = self.input(name, default)
+        return default if isinstance(found, Node) else found
+
+    def number(self, name: str, default: float) -> float:
+        found = self.value(name, default)
+        return float(found) if isinstance(found, int | float) else default
+
+    def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        found = self.value(name, default)
+        if isinstance(found, int | float):
+            return (float(found),) * len(default)
+        return found if isinstance(found, tuple) and len(found) == len(default) else default
+
+
+def follow(given: UsdShade.Input | UsdShade.Output, time: Usd.TimeCode, default: Any = None) -> Any:
+    """What an input takes, through the interfaces of groups of nodes; `default` where nothing is said."""
+    sources = UsdShade.Utils.GetValueProducingAttributes(given)
+    if not sources:
+        return default
+    source = sources[0]
+    if UsdShade.Output.IsOutput(source):
+        shader = UsdShade.Shader(source.GetPrim())
+        return Node(shader, str(source.GetBaseName()), time) if shader else default
+    return plain(source.Get(time), default)
+
+
+def surface_of(material: UsdShade.Material, context: str, time: Usd.TimeCode) -> Node | None:
+    """The shader of a material's surface in a render context; "" is everybody's."""
+    output = material.GetSurfaceOutput(context)
+    found = follow(output, time) if output else None
+    return found if isinstance(found, Node) else None
+
+
+def plain(value: Any, default: Any = None) -> Any:
+    """A value of the library as one of Python: float, tuple of floats, string, bool; an asset as its path."""
+    if value is None:
+        return default
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, int | float):
+        return _shortest(value)
+    if isinstance(value, Sdf.AssetPath):
+        return str(value.path)
+    if isinstance(value, Vt.TokenArray | Vt.StringArray | Gf.Matrix3d | Gf.Matrix4d):
+        return default
+    try:
+        return tuple(_shortest(each) for each in value)
+    except (TypeError, ValueError):
+        return default
+
+
+def _shortest(value: float) -> float:
+    """A number as its author wrote it: the file has 0.8 in single precision, and not 0.800000011920929."""
+    return float(f"{float(value):.7g}")
