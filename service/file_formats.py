@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, get_args
 
 from service.assets.formats import COMPRESSIONS, KINDS, missing
+from service.exports import FORMATS
 from service.images import animation
 from service.views import FileFormat
 
@@ -17,6 +18,7 @@ def told() -> dict[str, Any]:
         "animations": list(animation.FORMATS),
         **{name: [format for format, each in KINDS.items() if each == kind] for name, kind in READ.items()},
         "materials": ["zip", "mtlx"],
+        "exports": [name for name, each in FORMATS.items() if each.has_scenes and each.is_provided],
         "compressions": list(COMPRESSIONS),
         "missing": missing(),
     }

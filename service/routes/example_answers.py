@@ -67,6 +67,7 @@ INFO: dict[str, Any] = {
         "images": ["png", "exr", "hdr"],
         "luts": ["cube"],
         "materials": ["zip"],
+        "exports": ["glb"],
         "compressions": ["draco", "meshopt"],
         "missing": {"ktx2": "opengl-basisu"},
     },

@@ -143,6 +143,9 @@ def _anisotropy(of: MaterialWriter) -> Tree:
     if isinstance(turn, ScalarTexture):
         of.tell("anisotropic_rotation", "a texture of directions is left out")
         turn = 0.0
+    if plane is not None and m.normal_map is None:  # else glTF asks for tangents in the mesh
+        of.tell("anisotropic", "without a normal map its texture has no place in glTF; its factor is written")
+        plane = None
     if plane is not None or isinstance(m.roughness, ScalarTexture):
         of.tell("anisotropic", "under a texture, glTF stretches the highlight along the tangent only")
         strength = math.sqrt(amount)

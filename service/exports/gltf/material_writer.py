@@ -61,17 +61,16 @@ class MaterialWriter:
             made = {"alphaMode": "BLEND"} if cutoff is None else {"alphaMode": "MASK", "alphaCutoff": cutoff}
             if plane is None and any(planes) and isinstance(color, ColorTexture) and self.textures.has_alpha(color):
                 plane = Plane(value=1.0)  # the image's own alpha does not count
-        info = self.textures.info((*self._white(planes, plane), plane), is_srgb=True)
+        if plane is not None and plane.reference is not None and not any(planes):
+            self.tell(field, "the colour becomes a factor on a white image beside alpha's, which rounds it")
+            planes = (Plane(), Plane(), Plane())
+        info = self.textures.info((*planes, plane), is_srgb=True)
         rough: Tree = {}
         if (*factor, share) != (1, 1, 1, 1):
             rough["baseColorFactor"] = [*factor, share]
         if info is not None:
             rough["baseColorTexture"] = info
         return {"pbrMetallicRoughness": rough, **made}
-
-    def _white(self, planes: Any, other: Plane | None) -> Any:
-        """White planes where only the fourth one has a texture."""
-        return planes if any(planes) or other is None else (Plane(), Plane(), Plane())
 
     def color(self, value: Any, field: str, most: float = 1.0) -> tuple[tuple[float, ...], Any]:
         """The factor within 0..`most`, and the planes of red, green and blue, None without a texture."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeGuard
 
 from service.exports.gltf import extensions
@@ -32,8 +32,11 @@ class Materials:
 
     def index(self, name: str, asked: Asked) -> int:
         """Raises InvalidDocument, TooLarge."""
-        if not _transmits(self.scene.materials[name]):
+        material = self.scene.materials[name]
+        if not _transmits(material):
             asked = Asked(asked.double_sided, asked.fades)
+        elif not _shines(material):  # such a body has both sides in any case, and glTF wants it to be single-sided
+            asked = replace(asked, double_sided=False)
         key = name, asked
         if key not in self._known:
             self._known[key] = self.builder.add("materials", {"name": name, **self._written(name, asked)})

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import struct
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
-from gpu import Renderer
+from gpu import Renderer, RenderSettings
 from service import presets
 from service.assets import AssetStore
 from service.config import Config
-from service.exports import FORMATS, Exported
+from service.exports import FORMATS, Exported, Losses
 from service.pack import pack
+from service.problems import InvalidDocument, TooLarge
 from service.scene import parse_scene
 from tests.asset_files import png
 
@@ -113,7 +117,8 @@ def textured(store: AssetStore) -> dict[str, Any]:
              "anisotropic_rotation": 20}  # fmt: skip
     return scene(
         {**QUAD, "material": "printed", "name": "Wall"},
-        {**TENT, "material": "glass", "name": "Tent/Roof", "transform": TURNED},
+        {**TENT, "material": "glass", "name": "Tent/Roof", "transform": TURNED,
+         "double_sided": False},
         {**TENT, "material": "satin", "name": "Tent/Floor", "double_sided": False, "smooth": False,
          "transform": {"scale": [-1, 1, 1]}},
         textures={"color": {"asset": color, **placed}, "data": {"asset": data}},
@@ -130,3 +135,131 @@ def test_a_scene_of_meshes_comes_back_to_the_bit(store: AssetStore, gpu: Rendere
     assert [shape["name"] for shape in after["shapes"]] == ["Wall", "Tent/Roof", "Tent/Floor"]
     assert "environment" not in after
     assert_same_arrays(before, after, store)
+    one, other = (pixels(gpu, each, store) for each in (before, after))
+    assert one.mean() > 0.1 and np.array_equal(one, other)
+
+
+def pixels(gpu: Renderer, document: dict[str, Any], store: AssetStore) -> np.ndarray:
+    made = gpu.picture(gpu.load(pack(parse_scene(document), store).arrays), RenderSettings(width=24, height=24))
+    made.trace(600.0, 2)
+    values = made.read()
+    made.release()
+    return values
+
+
+def test_channels_move_without_a_loss(store: AssetStore) -> None:
+    """glTF reads roughness from green beside metallic in blue, and alpha beside the colour."""
+    color, data = (store.add(png(each)).id for each in (COLOR, DATA))
+    material = {
+        "type": "principled",
+        "base_color": {"texture": "color"},
+        "alpha": {"texture": "data", "channel": "r"},
+        "roughness": {"texture": "data", "channel": "a"},
+        "metallic": 1,
+    }
+    textures = {"color": {"asset": color}, "data": {"asset": data}}
+    made = exported(scene({**QUAD, "material": "m"}, textures=textures, materials={"m": material}), store)
+    assert lost(made) == {}
+    after = again(made, store)
+    found = after["materials"]["m"]
+    rough = store.image(after["textures"][found["roughness"]["texture"]]["asset"]).pixels
+    both = store.image(after["textures"][found["base_color"]["texture"]]["asset"]).pixels
+    assert np.array_equal(rough[..., 1], DATA[..., 3]) and (rough[..., 2] == 255).all()
+    assert np.array_equal(both, np.dstack([COLOR, DATA[..., 0]])) and found["alpha"]["channel"] == "a"
+
+
+def test_images_keep_their_bytes(store: AssetStore) -> None:
+    data = png(COLOR)
+    material = {"type": "principled", "base_color": {"texture": "t"}}
+    textures = {"t": {"asset": store.add(data).id}}
+    assert (
+        data in exported(scene({**QUAD, "material": "m"}, textures=textures, materials={"m": material}), store).data
+    )
+
+
+BALL = {"type": "sphere", "center": [1, 2, 3], "radius": 0.5, "material": "m"}
+TOLD: list[tuple[str, dict[str, Any], str]] = [
+    ("a sphere", {"shapes": [BALL]}, "/shapes/0"),
+    ("depth of field", {"camera": {"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}},
+     "/camera/aperture_radius"),
+    ("the environment", {"environment": {"type": "constant", "radiance": 1}}, "/environment"),
+    ("a sun's size", {"lights": [LIGHTS[2] | {"angular_diameter": 0.5}]}, "/lights/0/angular_diameter"),
+    ("a sharp edge", {"lights": [LIGHTS[1] | {"inner_angle": 33}]}, "/lights/0/inner_angle"),
+    ("what is hidden", {"shapes": [{**QUAD, "material": "m", "visible_to_camera": False}]},
+     "/shapes/0/visible_to_camera"),
+    ("a number between floats", {"shapes": [{**TENT, "material": "m", "transform": {"scale": 0.7},
+     "vertices": [[-1, -1, 0], [0.1, -1, 0.3], [0.1, 1, 0.3], [-1, 1, 0]]}]}, "/shapes/0"),
+    ("a half of a lamp", {"materials": {"m": {"type": "principled", "emission": 3}}}, "/shapes/0"),
+    ("a parameter", {"materials": {"m": {"type": "principled", "subsurface": 0.5}}}, "/materials/m/subsurface"),
+    ("gloss", {"materials": {"m": {"type": "principled", "clearcoat": 1}}}, "/materials/m/clearcoat_gloss"),
+    ("a model", {"materials": {"m": {"type": "diffuse", "albedo": 0.5}}}, "/materials/m/type"),
+    ("a checker", {"materials": {"m": {"type": "principled", "base_color": {"texture": "t"}}},
+     "textures": {"t": {"type": "checker", "a": 1, "b": [1, 0, 0]}}}, "/textures/t"),
+    ("an idle material", {"materials": {"m": {"type": "principled"}, "n": {"type": "principled"}}}, "/materials/n"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "part", "pointer"), TOLD, ids=[each[0] for each in TOLD])
+def test_what_is_lost_is_told_once(store: AssetStore, what: str, part: dict[str, Any], pointer: str) -> None:
+    made = exported({**scene({**QUAD, "material": "m"}), **part}, store)
+    assert list(lost(made)) == [pointer] and len(made.losses) == 1
+
+
+def test_solids_stand_where_the_document_has_them(store: AssetStore) -> None:
+    """In trimesh's reading: their boxes, volumes and outward sides; a sheared box as well."""
+    sheared = {"matrix": [1, 0.5, 0, 3, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1]}
+    shapes = [
+        BALL,
+        {"type": "box", "min": [-2, 0, 0], "max": [-1, 1, 3], "material": "m", "name": "a/b"},
+        {"type": "box", "min": [0, 0, 0], "max": [1, 1, 1], "material": "m", "transform": sheared},
+    ]
+    found = trimesh.load(io.BytesIO(exported(scene(*shapes), store).data), file_type="glb")
+    parts = [
+        found.geometry[name].copy().apply_transform(place)
+        for place, name in (found.graph[node] for node in found.graph.nodes_geometry)
+    ]
+    volumes = sorted(each.volume for each in parts)
+    assert volumes == pytest.approx([math.pi / 6, 2, 3], rel=4e-3)
+    assert np.allclose(found.bounds, [[-2, 0, 0], [4.5, 2.5, 3.5]], atol=1e-6)
+
+
+def test_a_checker_is_painted_the_right_way_up(store: AssetStore) -> None:
+    """Where u and v begin stands its first colour; the importer's coordinates lead there."""
+    textures = {"t": {"type": "checker", "a": 1, "b": [1, 0, 0], "scale": [2, 4]}}
+    material = {"type": "principled", "base_color": {"texture": "t"}}
+    made = exported(scene({**QUAD, "material": "m"}, textures=textures, materials={"m": material}), store)
+    (texture,) = again(made, store)["textures"].values()
+    image = store.image(texture["asset"]).pixels
+    for u, v, color in ((0.1, 0.1, 255), (0.6, 0.1, 0), (0.1, 0.3, 0), (0.6, 0.3, 255)):
+        x, y = (a * s + o for a, s, o in zip((u, v), texture["scale"], texture.get("offset", (0, 0)), strict=True))
+        assert image[int((1 - y % 1) * len(image)), int(x % 1 * len(image)), 1] == color
+
+
+def test_equal_things_are_written_once(store: AssetStore) -> None:
+    """Balls share their triangles; a material of shapes that differ in their sides comes back as one."""
+    sides = [{**QUAD, "material": "m", "double_sided": side} for side in (True, False)]
+    made = exported(scene(*sides, BALL, {**BALL, "center": [0, 0, 0]}), store)
+    tree = tree_of(made)
+    assert (len(tree["materials"]), len(tree["meshes"]), len(tree["nodes"])) == (2, 3, 6)
+    assert list(again(made, store)["materials"]) == ["m"]
+
+
+def test_work_is_bounded(store: AssetStore) -> None:
+    few = CONFIG.model_copy(update={"max_triangles": 1})
+    small = CONFIG.model_copy(update={"max_asset": 500})
+    document = parse_scene(scene({**QUAD, "material": "m"}))
+    with pytest.raises(InvalidDocument, match="SUNBOX_MAX_TRIANGLES"):
+        FORMATS["glb"].scene_writer(document, store, few)
+    with pytest.raises(TooLarge, match="SUNBOX_MAX_ASSET"):
+        FORMATS["glb"].scene_writer(document, store, small)
+
+
+def test_a_long_list_fits_a_header() -> None:
+    losses = Losses()
+    for k in range(500):
+        losses.add(f"/shapes/{k}", "the same")
+        losses.add(f"/materials/{k}", f"something else, {k}: {'x' * 100}")
+    listed = json.loads(losses.header("/scene"))
+    assert len(losses.header("/scene")) <= 4096
+    assert listed[0] == {"pointer": "/scene/shapes/0", "detail": "the same", "count": 500}
+    assert listed[-1]["detail"].startswith("and ") and len(listed) > 5
