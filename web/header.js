@@ -7,10 +7,12 @@ import { WhenClean } from "./panels/when-clean.js";
 import { ExportMenu, handOut } from "./panels/export-menu.js";
 import { SceneMenu } from "./panels/scene-menu.js";
 import * as exporting from "./picture/export.js";
+import { fieldTitles } from "./server/problem-text.js";
 
 // `titleOf(chosen)` is the scene's name in words; `recipes` as pictureRecipes has them.
 export function makeHeader({
   find,
+  schema,
   page,
   editor,
   stream,
@@ -43,6 +45,7 @@ export function makeHeader({
       announce: say,
     },
   });
+  const shownSettings = () => exporting.exactSettings(page.settings, page.header?.samples ?? 1);
   const whenClean = new WhenClean({ page, editor, messages });
   const exportMenu = new ExportMenu(find("export-menu"), {
     title: () => titleOf(editor.state.chosen) || "Your own scene",
@@ -56,18 +59,20 @@ export function makeHeader({
     },
     png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
     exr: () => exporting.exr(stream, page.layers, recipes.madeFrom),
-    command: () =>
-      exporting.curl(
-        editor.state.scene,
-        exporting.exactSettings(page.settings, page.header?.samples ?? 1),
-        page.view,
-      ),
+    command: () => exporting.curl(editor.state.scene, shownSettings(), page.view),
+    async program() {
+      const { pythonProgram } = await import("./picture/program.js");
+      return pythonProgram(editor.state.scene, shownSettings(), page.view);
+    },
+    formats: () => page.info?.formats.exports ?? [],
+    titles: () => fieldTitles(schema.scene),
+    messages,
     show: tellOf,
     complain,
     announce: say,
   });
   watchMenu(find("scene-menu"), find("page-save"), { opened: () => sceneMenu.refresh() });
-  watchMenu(find("export"), find("export-menu"));
+  watchMenu(find("export"), find("export-menu"), { opened: () => exportMenu.refresh() });
   watchMenu(find("readings-button"), find("readings"));
   find("share").addEventListener("click", async () => {
     try {

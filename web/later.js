@@ -90,6 +90,7 @@ export function laterParts({
     async ({ makeHeader }) =>
       makeHeader({
         find,
+        schema,
         page,
         editor,
         stream,

@@ -12,3 +12,6 @@ export const pictureFile = (title, { width, height, samples }, ending) =>
 
 // A document's file: the scene's name, and what of it.
 export const documentFile = (title, what, ending) => `${stem(title)}-${what}.${ending}`;
+
+// A whole scene's.
+export const sceneFile = (title, ending) => `${stem(title)}.${ending}`;

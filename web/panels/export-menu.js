@@ -4,10 +4,19 @@ import { documentFile, pictureFile } from "../document/file-name.js";
 import { element } from "../lib/dom.js";
 import { jsonBlob, saveAs } from "../lib/files.js";
 
+// Formats of scenes: how people call them, for whom they are, and the server's name.
+const SCENES = [
+  ["glTF", "for other programs", "glb"],
+  ["MaterialX", "materials alone", "mtlx"],
+];
+
 export class ExportMenu {
   // `acts`: title() of the scene, scene(), material(), png(bits) and exr() -> {blob, header}, isWanted() resolves to
-  // whether the PNG is to be saved, link() to the page as it is, made() in words of what, command(), complain(error), announce(text).
+  // whether the PNG is to be saved, link() to the page as it is, made() in words of what, command() and program() that
+  // make this picture, formats() that the server writes scenes in, titles() of fields, messages, complain(error),
+  // announce(text).
   constructor(root, acts) {
+    this.root = root;
     this.acts = acts;
     const picture = (make, ending) => () =>
       this.#try(async () => {
@@ -17,19 +26,34 @@ export class ExportMenu {
       });
     this.png = picture(() => acts.png(8), "png");
     const json = (kind) => () => saveAs(jsonBlob(acts[kind]()), documentFile(acts.title(), kind, "json"));
-    const items = [
+    this.pictures = [
       ["PNG", "8 bit, as it is on screen", "download", this.png],
       ["PNG, 16 bit", "", "download-16", picture(() => acts.png(16), "png")],
       ["EXR", "all layers, linear", "download-exr", picture(() => acts.exr(), "exr")],
       ["Share picture", "with name, material and link", "share-picture", () => this.#try(() => this.#share())],
-      null,
+    ];
+    this.documents = [
       ["JSON, scene", "", "download-scene", json("scene")],
       ["JSON, material", "", "download-material", json("material")],
-      null,
-      ["curl", "copies a command that makes this picture", "copy-curl", () => this.#command()],
     ];
-    root.replaceChildren(
-      ...items.map((item) => {
+    this.programs = [
+      ["curl", "copies a command that makes this picture", "copy-curl", () => this.#hand("command")],
+      ["Python", "copies a program that does", "copy-python", () => this.#hand("program")],
+    ];
+    this.refresh();
+  }
+
+  // Call before it is shown.
+  refresh() {
+    const known = this.acts.formats();
+    const files = SCENES.filter(([, , format]) => known.includes(format)).map(([title, note, format]) => [
+      title,
+      note,
+      `download-${format}`,
+      () => this.#file(format),
+    ]);
+    this.root.replaceChildren(
+      ...[...this.pictures, null, ...files, ...this.documents, null, ...this.programs].map((item) => {
         if (!item) return element("hr");
         const [title, note, id, does] = item;
         return element(
@@ -65,8 +89,13 @@ export class ExportMenu {
     await handOut(url, "The picture is saved. The link", this.acts);
   }
 
-  #command() {
-    return this.#try(() => handOut(this.acts.command(), "The command", this.acts));
+  // A scene for another program, which may lose some of it.
+  #file(format) {
+    return this.#try(async () => (await import("./file-export.js")).exportFile(format, this.acts));
+  }
+
+  #hand(what) {
+    return this.#try(async () => handOut(await this.acts[what](), `The ${what}`, this.acts));
   }
 }
 

@@ -127,6 +127,15 @@ export async function compareMap(a, b, map, signal) {
   return { verdict: JSON.parse(response.headers.get("sunbox-verdict")), blob: await response.blob() };
 }
 
+// A scene as a file of that format, what it loses, and how such a file's name ends.
+export async function exportScene(scene, format) {
+  const response = await ask("POST", "export", json({ scene, format }));
+  const [, ending] = /\.(\w+)"$/.exec(response.headers.get("content-disposition"));
+  return { blob: await response.blob(), lost: JSON.parse(response.headers.get("sunbox-lost")), ending };
+}
+
+export const serverUrl = () => new URL("..", root).href.replace(/\/$/, "");
+
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
 
 // Uploads a file: what the server says of it, {id, kind, ...}. `progress(share)` is told how much has gone.

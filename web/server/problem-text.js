@@ -92,6 +92,12 @@ export function warningText({ pointer = "", detail }) {
   return place ? `${place}: ${detail}` : sentence(detail);
 }
 
+// What a format has no place for, as a line: "Roughness of material A: ...".
+export function lossText({ pointer, detail, count = 1 }, titles) {
+  const others = count > 1 ? `, and ${count - 1} more` : "";
+  return `${placeWords(pointer, titles)}${others}: ${detail}`;
+}
+
 const ended = (text) => (/[.!?…]$/.test(text) ? text : `${text}.`);
 
 // What is wrong with a value, short enough to stand beside it.

@@ -1,0 +1,40 @@
+"""The menu Export: files for other programs with what they lose, and programs that make the same picture."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_scene_leaves_as_glb_and_says_what_it_loses(editor: Editor, server: Server) -> None:
+    page = editor.page
+    made = editor.shot("#download-glb")
+    told = page.locator("#messages .export")
+    editor.wait("the losses", told.is_visible)
+    assert "no place" in told.inner_text() and "environment" in told.inner_text().lower()
+    assert "/scene" not in told.inner_text(), "places are in words"
+    answer = server.http.post("/v1/assets", content=made)
+    assert made[:4] == b"glTF" and answer.json()["kind"] == "scene"
+
+
+def test_a_program_makes_the_same_picture(editor: Editor, tmp_path: Path) -> None:
+    page, shown = editor.page, editor.shot("#download")
+    page.click("#export")
+    page.click("#copy-python")
+    editor.wait("the program", lambda: "Client" in page.input_value(".command"))
+    program = page.input_value(".command")
+    path = tmp_path / "program.py"
+    path.write_text(program)
+    subprocess.run([sys.executable, path], cwd=tmp_path, check=True, timeout=120)
+    with Image.open(tmp_path / "sunbox.png") as picture, Image.open(io.BytesIO(shown)) as own:
+        assert picture.size == own.size
