@@ -42,12 +42,13 @@ from gpu.picture.picture import Picture
 from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
 from gpu.renderer import Renderer
-from gpu.settings import AOVS, ESTIMATORS, FILTERS, FIRST_HIT_AOVS, SAMPLERS, TONE_MAPS, RenderSettings
+from gpu.settings import AOVS, COVERAGE_AOVS, ESTIMATORS, FILTERS, FIRST_HIT_AOVS, SAMPLERS, TONE_MAPS, RenderSettings
 from gpu.steps import Steps
 
 __all__ = [
     "ACCUMULATOR_BYTES",
     "AOVS",
+    "COVERAGE_AOVS",
     "ESTIMATORS",
     "FILTERS",
     "FIRST_HIT_AOVS",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpu.arrays import SceneArrays
-from gpu.layout.pixel_layers import ACCUMULATOR_BYTES, FIRST_HIT_BYTES, PLAN_BYTES
+from gpu.layout.pixel_layers import ACCUMULATOR_BYTES, COVER_BYTES, FIRST_HIT_BYTES, PLAN_BYTES
 from gpu.settings import RenderSettings
 
 FIXED_BYTES = 1 << 20  # bytes of every picture, whatever its size: the noise meter's buffers and small ones
@@ -29,9 +29,9 @@ def unshared_bytes(scene: SceneArrays) -> int:
     return scene_bytes(scene) - shared
 
 
-def picture_bytes(settings: RenderSettings, guided: bool = False) -> int:
-    """About how many bytes a picture takes on the device at most, with the AOVs of the first hit (`guided`) or
-    without. A block of samples takes memory from sample 9 on."""
+def picture_bytes(settings: RenderSettings, guided: bool = False, covered: bool = False) -> int:
+    """About how many bytes a picture takes on the device at most, with the AOVs of the first hit (`guided`) and
+    with coverage, or without. A block of samples takes memory from sample 9 on."""
     block = PLAN_BYTES if settings.adaptive else ACCUMULATOR_BYTES
-    pixel_bytes = ACCUMULATOR_BYTES + block + (FIRST_HIT_BYTES if guided else 0)
+    pixel_bytes = ACCUMULATOR_BYTES + block + (FIRST_HIT_BYTES if guided else 0) + (COVER_BYTES if covered else 0)
     return settings.width * settings.height * pixel_bytes + FIXED_BYTES

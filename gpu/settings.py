@@ -16,6 +16,7 @@ FIRST_HIT_AOVS = (
     *ID_AOVS,
     "incidence",
 )  # traced apart from the picture, when they are first read
+COVERAGE_AOVS = ("shape_coverage", "material_coverage")  # of Cryptomatte; traced apart, too
 AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS, "incidence")
 
 

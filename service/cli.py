@@ -101,6 +101,7 @@ def _picture(command: argparse.ArgumentParser) -> None:
     curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
     add("--tone-map", metavar="NAME", help=f"for .png: {_any_of([*curves, 'ocio:DISPLAY/VIEW'])}")
     add("--color-space", metavar="NAME", help=f"for .png: {_any_of(COLOR_SPACES)}")
+    add("--cryptomatte", action="store_true", help="for .exr: what shapes and materials cover of each pixel, too")
     add("--lut", metavar="CUBE", help="for .png: a .cube file, through which displayed colours go last")
 
 

@@ -26,6 +26,9 @@ class Slot(IntEnum):
     ALBEDO = 13
     NORMAL = 14
     FIRST_HITS = 15
+    # cover.comp
+    SHAPE_COVER = 13
+    MATERIAL_COVER = 14
     # pathtrace.comp
     COUNTERS = 13
     SAMPLE_PLAN = 14

@@ -15,6 +15,7 @@ readout       a picture's mean, variance, noise and first hits, read from the ac
 dispatcher    runs kernels over parts of a picture
 first_hit     AOVs of the first hit
 look          exposure, tone map, primaries and tables of a picture that is shown
+coverage      how much of each pixel a shape or a material covers
 resolve       accumulators to display values, on the device
 display       AOVs as pictures for the eye
 filters       pixel filters as inverse distributions

@@ -46,13 +46,15 @@ class Dispatcher:
         self._uniform_buffer.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
         self._filter.bind_to_uniform_block(bindings.FILTER_BLOCK)
 
-    def bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int) -> int:
-        """Bind the part of each buffer, of rows of `width` pixels, that a tile touches; the part's first pixel."""
+    def bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int, vectors: int = 1) -> int:
+        """Bind the part of each buffer, of rows of `width` pixels with `vectors` for each, that a tile touches; the
+        part's first pixel."""
         x, y, columns, rows = tile
+        each = VECTOR_BYTES * vectors
         first = (y * width + x) // _ALIGNED * _ALIGNED
         count = (y + rows - 1) * width + x + columns - first
         for slot, buffer in buffers.items():
-            buffer.bind_to_storage_buffer(int(slot), offset=first * VECTOR_BYTES, size=count * VECTOR_BYTES)
+            buffer.bind_to_storage_buffer(int(slot), offset=first * each, size=count * each)
         return first
 
     def uniforms(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:

@@ -23,7 +23,7 @@ from gpu.picture.passes import Passes
 from gpu.picture.readout import Readout
 from gpu.picture.saved import NO_BLOCK, Saved
 from gpu.picture.shared_block import SharedBlock
-from gpu.settings import FIRST_HIT_AOVS, RenderSettings
+from gpu.settings import COVERAGE_AOVS, FIRST_HIT_AOVS, RenderSettings
 
 PIECE_BYTES = 16 << 20  # of a saved buffer that one step reads, in some milliseconds
 
@@ -73,6 +73,7 @@ class Picture:
         for buffer in self._beside:
             buffer.clear()
         self._readout.first_hit.clear()
+        self._readout.coverage.clear()
 
     @property
     def _beside(self) -> list[Any]:
@@ -132,9 +133,13 @@ class Picture:
         return bool(self._readout.first_hit.buffers)
 
     @property
-    def guided_yet(self) -> bool:
-        """Whether any first hit was traced: then their kernel is compiled."""
-        return self._readout.first_hit.begun
+    def covered(self) -> bool:
+        """Whether coverage is allocated."""
+        return bool(self._readout.coverage.buffers)
+
+    def guided_yet(self, coverage: bool = False) -> bool:
+        """Whether any first hit, or its coverage, was traced: then their kernel is compiled."""
+        return (self._readout.coverage if coverage else self._readout.first_hit).begun
 
     @property
     def warnings(self) -> list[str]:
@@ -204,11 +209,15 @@ class Picture:
     def read(self, aov: str = "color") -> np.ndarray:
         """Linear (height, width, channels) float32, row 0 at the top: color 4 (premultiplied), albedo 3, normal 3,
         depth 1 (0 where nothing is hit), variance 3 (of the pixel's mean), shape_id and material_id 1 (index + 1 of
-        the shape that the first sample's camera ray hits; 0 where it hits nothing).
+        the shape that the first sample's camera ray hits; 0 where it hits nothing), shape_coverage and
+        material_coverage 12 (see `Coverage.read`).
 
         Waits for the GPU. Raises NothingRendered before a sample is complete.
         """
         self._need_samples()
+        if aov in COVERAGE_AOVS:
+            self.trace_guides(coverage=True)
+            return self._readout.coverage.read(aov)
         if aov in FIRST_HIT_AOVS:
             self.trace_guides()
             return self._readout.first_hit.read(aov)
@@ -219,8 +228,8 @@ class Picture:
         self.trace_guides(most=most)
         return self._readout.first_hit.read("albedo"), self._readout.first_hit.read("normal")
 
-    def trace_guides(self, budget_s: float = math.inf, most: int | None = None) -> bool:
-        """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
+    def trace_guides(self, budget_s: float = math.inf, most: int | None = None, coverage: bool = False) -> bool:
+        """Trace the AOVs of the first hit, or `coverage`, for about `budget_s` seconds; whether they are all there.
 
         They cover the camera rays of the picture's first 256 samples at most, or with `most` exactly the first
         `most`. `read` traces those that are still missing.
@@ -230,7 +239,7 @@ class Picture:
         want = min(self.samples, most or first_hit.SAMPLES)
         if most is not None:
             self._readout.first_hit.limit(want)
-        return self._readout.trace_first_hits(want, until, self._passes.schedule.rates)
+        return self._readout.trace_first_hits(want, until, self._passes.schedule.rates, coverage)
 
     def noise(self) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
@@ -264,6 +273,7 @@ class Picture:
         for buffer in self._meter.buffers.values():
             buffer.release()
         self._readout.first_hit.release()
+        self._readout.coverage.release()
         self._passes.release()
         self._dispatcher.release()
         self.released = True

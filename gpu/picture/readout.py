@@ -11,8 +11,10 @@ import numpy as np
 
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
+from gpu.layout.pixel_layers import COVER_VECTORS
 from gpu.picture import noise_meter
 from gpu.picture.accumulators import Accumulators
+from gpu.picture.coverage import Coverage
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
 from gpu.picture.look import Look
@@ -30,6 +32,7 @@ class Readout:
         self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
         self._size = dispatcher.settings.width, dispatcher.settings.height
         self.first_hit = FirstHit(dispatcher.context, self._size, dispatcher.most_pixels)
+        self.coverage = Coverage(dispatcher.context, self._size, dispatcher.most_pixels)
 
     def _pieces(self) -> Iterator[tuple[int, int]]:
         """The first pixel and the number of pixels of pieces that fit into a processor's cache."""
@@ -76,21 +79,22 @@ class Readout:
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)
 
-    def trace_first_hits(self, want: int, until: float, rates: np.ndarray) -> bool:
-        """Trace first hits until there are `want` samples, or until the clock (perf_counter) is at `until`. Returns
-        whether all samples are there. `rates` are those of the picture's schedule."""
-        d = self._dispatcher
-        if not self.first_hit.buffers:
-            self.first_hit.allocate()
-        if self.first_hit.samples < want and time.perf_counter() < until:
-            kernel = self._kernels.get("guides.comp", d.scene.defines(d.settings))
+    def trace_first_hits(self, want: int, until: float, rates: np.ndarray, coverage: bool = False) -> bool:
+        """Trace first hits, or their `coverage`, until there are `want` samples, or until the clock (perf_counter) is
+        at `until`. Returns whether all samples are there. `rates` are those of the picture's schedule."""
+        d, hits = self._dispatcher, self.coverage if coverage else self.first_hit
+        if not hits.buffers:
+            hits.allocate()
+        if hits.samples < want and time.perf_counter() < until:
+            kernel = self._kernels.get("cover.comp" if coverage else "guides.comp", d.scene.defines(d.settings))
+            vectors = COVER_VECTORS if coverage else 1
             d.bind()
-            self.first_hit.trace(lambda tile, sample: self._trace_first_hit(kernel, tile, sample), want, until, rates)
-        return self.first_hit.samples >= want
+            hits.trace(lambda tile, i: self._trace_first_hit(kernel, hits, vectors, tile, i), want, until, rates)
+        return hits.samples >= want
 
-    def _trace_first_hit(self, kernel: Any, tile: Tile, sample: int) -> None:
+    def _trace_first_hit(self, kernel: Any, hits: FirstHit, vectors: int, tile: Tile, sample: int) -> None:
         d = self._dispatcher
         uniforms = d.uniforms(tile[:2], tile[2:], sample, 1)
-        uniforms["slot_first"] = d.bind_part(self.first_hit.buffers, tile, d.settings.width)
+        uniforms["slot_first"] = d.bind_part(hits.buffers, tile, d.settings.width, vectors)
         d.run(kernel, uniforms, work_groups(tile[2], tile[3]))
         d.context.finish()

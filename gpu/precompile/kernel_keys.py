@@ -19,7 +19,8 @@ from gpu.picture import accumulators, noise_meter, resolve
 from gpu.picture.look import Look
 from gpu.settings import TONE_MAPS, RenderSettings
 
-ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common_keys`
+# The kernels that depend on the scene; `common_keys` has the others.
+ENTRY, GUIDES, COVER = "pathtrace.comp", "guides.comp", "cover.comp"
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from service.views import AOVS, COLOR_SPACES, LEAST_EXPOSURE, MOST_EXPOSURE, TON
 if TYPE_CHECKING:
     from service.commands.assets import SourceAssets
     from service.commands.tracing import Tracing
+    from service.images.cryptomatte import Cryptomatte
     from service.images.recipe import PictureView
     from service.ipc.messages import Lut
 
@@ -42,6 +43,16 @@ class Output:
     path: Path
     format: LosslessFormat
     view: PictureView
+    names: dict[str, list[str]] | None = None  # of shapes and materials, for Cryptomatte
+
+    def matte(self, tracing: Tracing) -> Cryptomatte | None:
+        """What shapes and materials cover of each pixel, where that was asked for."""
+        from service.images.cryptomatte import LAYERS, Cryptomatte
+        from service.ipc.messages import View
+
+        if self.names is None:
+            return None
+        return Cryptomatte({aov: tracing.pixels(View(aov, encoding="linear")) for aov in LAYERS}, self.names)
 
     @property
     def is_repeatable(self) -> bool:
@@ -60,8 +71,12 @@ def run(arguments: argparse.Namespace) -> int:
     from service.system.shared_memory import reuse_freed  # here, as it loads numpy
 
     reuse_freed()
+    from service.images.cryptomatte import names_of
+
     source = read_source(Path(arguments.input), arguments.asset_root, config)
     output = Output(path, format, _view(arguments, format, exposure, source.view))
+    if arguments.cryptomatte:
+        output = replace(output, names=names_of(source.document))
     size = picture_size(given, source.aspect_ratio)
     base = source.settings | size
     chosen = read_settings(arguments.set or [], config, base) if base else given
@@ -104,6 +119,8 @@ def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, flo
         _choose("--aov", arguments.aov, (*AOVS, "all"))
     if arguments.aov == "all" and format != "exr":
         raise BadInput("--aov all: only an .exr file holds more than one; name one of " + ", ".join(AOVS))
+    if arguments.cryptomatte and (format != "exr" or arguments.aov not in (None, "color", "all")):
+        raise BadInput("--cryptomatte: is for an .exr file, with --aov color or all")
     if arguments.tone_map is not None:
         _check_tone_map(arguments.tone_map)
     if arguments.color_space is not None:
@@ -184,7 +201,12 @@ def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, st
     if output.is_repeatable:
         made_from = recipe.write(document, tracing.settings, tracing.progress.samples, view, names)
     if view.aov == "all":
-        return images.encode_layers({aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from)
+        return images.encode_layers(
+            {aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from, output.matte(tracing)
+        )
+    if output.names is not None:
+        color = tracing.pixels(View("color", encoding="linear"))
+        return images.encode_layers({"color": color}, made_from, output.matte(tracing))
     encoding = images.FORMATS[output.format].encoding(view.bits)
     p3 = view.color_space == "display_p3"
     pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding, p3, lut))

@@ -101,6 +101,7 @@ def _fetch(client: Client, arguments: argparse.Namespace) -> int:
     output = files.writable(path)
     asked = {"aov": arguments.aov, "exposure": arguments.exposure, "tone_map": arguments.tone_map}
     asked |= {"color_space": arguments.color_space, "lut": arguments.lut}
+    asked["cryptomatte"] = "true" if arguments.cryptomatte else None
     view = {name: value for name, value in asked.items() if value is not None}
     files.write(output, client.job(arguments.id).picture().fetch(format, **view))
     return 0

@@ -4,6 +4,7 @@ encoders       how each format is written
 metadata       the metadata of PNG and EXR files
 icc            what the numbers of a picture stand for, as files say it
 recipe         the scene and settings that a picture was made from, in that metadata
+cryptomatte    which things cover how much of each pixel, as EXR files say it
 contact_sheet  many pictures on one, each with its name
 animation      pictures one after the other
 """
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from service import displays
+from service.images.cryptomatte import Cryptomatte
 from service.images.encoders import (
     Array,
     Choices,
@@ -124,16 +126,23 @@ def write(
     _row(format).write(file, _three_axes(pixels), Choices(bits, metadata=metadata, encoding=encoding))
 
 
-def encode_layers(layers: dict[str, Array], metadata: Metadata | None = None) -> bytes:
+def encode_layers(
+    layers: dict[str, Array], metadata: Metadata | None = None, cryptomatte: Cryptomatte | None = None
+) -> bytes:
     """An EXR with every AOV as a layer: R G B A, albedo.R, normal.X, depth.Z ... in the order of LAYERS."""
-    return in_memory(lambda file: write_layers(file, layers, metadata))
+    return in_memory(lambda file: write_layers(file, layers, metadata, cryptomatte))
 
 
-def write_layers(file: BinaryIO, layers: dict[str, Array], metadata: Metadata | None = None) -> None:
+def write_layers(
+    file: BinaryIO, layers: dict[str, Array], metadata: Metadata | None = None, cryptomatte: Cryptomatte | None = None
+) -> None:
     """Write the bytes of `encode_layers`, as `write` does."""
     names = [name for name in LAYERS if name in layers]
     flat = [_three_axes(layers[name]) for name in names]
-    write_exr_layers(file, flat, tuple(c for name in names for c in LAYERS[name]), metadata)
+    channels, more = tuple(c for name in names for c in LAYERS[name]), None
+    if cryptomatte is not None:
+        flat, channels, more = flat + cryptomatte.pixels, channels + cryptomatte.channels, cryptomatte.metadata
+    write_exr_layers(file, flat, channels, metadata, more)
 
 
 def _row(format: FileFormat | StreamFormat) -> Format:

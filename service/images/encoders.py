@@ -94,9 +94,18 @@ def write_rgba32f(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 
 
 def write_exr_layers(
-    file: BinaryIO, layers: Sequence[Array], channels: tuple[str, ...], metadata: Metadata | None
+    file: BinaryIO,
+    layers: Sequence[Array],
+    channels: tuple[str, ...],
+    metadata: Metadata | None,
+    more: Mapping[str, str] | None = None,
 ) -> None:
-    attributes = {"compression": "zip", "DateTime": ""}  # else the time of writing: equal pictures give equal files
+    """Write an EXR; `more` are further attributes."""
+    attributes = {
+        **(more or {}),
+        "compression": "zip",
+        "DateTime": "",
+    }  # else the time of writing: equal pictures give equal files
     if metadata is not None:
         attributes[KEY] = _text(metadata)
     _write(file, "openexr", layers, "float", attributes, channels)

@@ -20,6 +20,8 @@ from service import images, views
 from service.displays import SRGB
 from service.http.downloads import Downloads, FileAnswer, Written, present
 from service.images import recipe
+from service.images.cryptomatte import LAYERS as CRYPTOMATTE_LAYERS
+from service.images.cryptomatte import Cryptomatte, names_of
 from service.ipc import messages
 from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
@@ -29,6 +31,7 @@ from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
 from service.scene.look import Lut, ToneMap, shown_as
+from service.scene.text import load_json
 from service.state import MOST_WAITS, app_state, caller_of, owner_of
 from service.system.executors import storing, writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat
@@ -47,6 +50,9 @@ Wait = Annotated[
 ]
 Kernel = Annotated[bool, Query(description="Answer with what the kernel was compiled for, too.")]
 Label = Annotated[str | None, Query(max_length=LONGEST_LABEL, description="Exactly this label.")]
+CRYPTOMATTE_NUMBERS = (
+    48  # of a pixel: 12 for each of two layers as the renderer sends them, and once more with hashes
+)
 FLOAT_BYTES = 4  # of a number in a layer, as the renderer sends it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
@@ -81,12 +87,18 @@ class ImageQuery(BaseModel):
     tone_map: ToneMap = DEFAULT_TONE_MAP
     color_space: views.ColorSpace = "srgb"
     lut: Lut = None
+    cryptomatte: Annotated[
+        bool,
+        Field(description="With exr: what shapes and materials cover of each pixel, by the hash of their names."),
+    ] = False
 
     def view(self) -> View:
         if self.bits == Bits.SIXTEEN and 16 not in images.FORMATS[self.format].bits:
             raise InvalidDocument([FieldError("/bits", f"16 is for png; a {self.format} file has its own")])
         if self.aov == "all" and self.format != "exr":
             raise InvalidDocument([FieldError("/aov", "all is for exr: no other format holds more than one")])
+        if self.cryptomatte and (self.format != "exr" or self.aov not in ("color", "all")):
+            raise InvalidDocument([FieldError("/cryptomatte", "is for exr, with the aov color or all")])
         shown_as(self.tone_map, self.color_space, self.format)
         encoding, p3 = images.FORMATS[self.format].encoding(self.bits), self.color_space == "display_p3"
         return View(self.aov, self.exposure, self.tone_map, encoding, p3)
@@ -303,6 +315,8 @@ async def _written(downloads: Downloads, job: Job, query: ImageQuery, lut: messa
         samples = samples or progress.samples
         if samples == 0:
             raise Conflict("There is no sample yet.")
+    for covered in CRYPTOMATTE_LAYERS if query.cryptomatte else ():
+        layers[covered], _ = await job.image(replace(view, aov=covered))
     document = await job.document()
     return await writing(lambda: downloads.write(partial(_write, layers, query, job, document, samples)))
 
@@ -320,7 +334,8 @@ def _most_bytes(job: Job, query: ImageQuery) -> int:
 
 def _texels(job: Job, query: ImageQuery) -> int:
     """The numbers in the layers of an image."""
-    return job.order.settings.width * job.order.settings.height * sum(len(images.LAYERS[aov]) for aov in _aovs(query))
+    numbers = sum(len(images.LAYERS[aov]) for aov in _aovs(query)) + CRYPTOMATTE_NUMBERS * query.cryptomatte
+    return job.order.settings.width * job.order.settings.height * numbers
 
 
 def _write(
@@ -338,7 +353,11 @@ def _write(
             lut=query.lut,
         )
         made_from = recipe.write_text(unfolded(document), job.order.settings, samples, view)
-    if query.aov == "all":
+    if query.cryptomatte:
+        coverage = {aov: layers.pop(aov) for aov in CRYPTOMATTE_LAYERS}
+        matte = Cryptomatte(coverage, names_of(load_json(unfolded(document))))
+        images.write_layers(file, layers, made_from, matte)
+    elif query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:
         stands = shown_as(query.tone_map, query.color_space) if query.aov == "color" else SRGB

@@ -42,7 +42,7 @@ class ResolutionLadder:
     @property
     def bytes(self) -> int:
         """The bytes that the pictures take on the device."""
-        return sum(picture_bytes(picture.settings, picture.guided) for picture in self._pictures.values())
+        return sum(picture_bytes(each.settings, each.guided, each.covered) for each in self._pictures.values())
 
     def picture(self, scale: float) -> Picture:
         if scale not in self._pictures:

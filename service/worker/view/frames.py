@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gpu import FIRST_HIT_AOVS, Lut, picture_bytes
+from gpu import COVERAGE_AOVS, FIRST_HIT_AOVS, Lut, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
 from service.displays import view_of
@@ -59,6 +59,7 @@ class FrameSource:
         self._served: _Content | None = None  # of the last frame that was sent
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
+        self._covers = False  # coverage is what is missing
         self._denoised_reads: list[Read] = []  # waiting for the denoised picture
         self._denoiser_answered = False  # the denoiser has answered, and pending reads are to be served
 
@@ -201,25 +202,26 @@ class FrameSource:
     def _hear_denoised(self) -> None:
         self._denoiser_answered = True
 
-    def _waits(self, picture: Picture) -> bool:
+    def _waits(self, picture: Picture, coverage: bool = False) -> bool:
         """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
-        if self._wait.compiler is None or picture.guided_yet:
+        if self._wait.compiler is None or picture.guided_yet(coverage):
             return False
-        scene = picture.scene
-        wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, kernel_keys.GUIDES)
+        scene, entry = picture.scene, kernel_keys.COVER if coverage else kernel_keys.GUIDES
+        wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, entry)
         if not self._wait.begin(wanted):
             self._wait.met(wanted)  # in a moment
         return self._wait.compiling
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:
-        if view.aov not in FIRST_HIT_AOVS:
+        coverage = view.aov in COVERAGE_AOVS
+        if view.aov not in FIRST_HIT_AOVS and not coverage:
             return False
-        if not picture.guided:
-            more = picture_bytes(picture.settings, guided=True) - picture_bytes(picture.settings)
+        if not (picture.covered if coverage else picture.guided):
+            more = picture_bytes(picture.settings, not coverage, coverage) - picture_bytes(picture.settings)
             self._residency.make_room(more)
-        if picture.trace_guides(0.0):
+        if picture.trace_guides(0.0, coverage=coverage):
             return False
-        self._guided = picture
+        self._guided, self._covers = picture, coverage
         return True
 
     def _trace_guides(self) -> bool:
@@ -229,9 +231,9 @@ class FrameSource:
             picture = self._residency.full
         if picture is None:
             return False
-        if self._waits(picture):
+        if self._waits(picture, self._covers):
             return True
-        if picture.trace_guides(SLICE_S):
+        if picture.trace_guides(SLICE_S, coverage=self._covers):
             self._guided = None
             reads, self._reads = self._reads, []
             for read in reads:
