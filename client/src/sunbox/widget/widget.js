@@ -22,6 +22,7 @@ const lib_format_text = (() => {
 const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
 const NAMES={
 aces: "ACES",
+aces2: "ACES 2",
 agx: "AgX",
 pbr_neutral: "PBR neutral",
 mis: "MIS",
