@@ -147,8 +147,7 @@ class MeshShape(_Placed):
             "Longest edge",
             "Of the triangles of a displaced mesh: shorter edges show finer relief and take more memory.",
             unit="m",
-            widget="slider",
-            soft=0.1,
+            widget="number",
             absent="1/200 of its size",
         ),
     ] = None

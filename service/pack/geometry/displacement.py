@@ -21,6 +21,7 @@ from service.problems import FieldError, InvalidDocument
 PARTS = 200  # of a mesh's size is the longest edge where the document gives none
 # Triangles of a mesh are this times its area over the square of the longest edge, at most: edges are cut in halves.
 DENSITY = 20.0
+LARGEST_TRIANGLE = math.sqrt(3) / 4  # its area over the square of its longest edge
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ def displaced(data: MeshData, smooth: np.ndarray | bool, by: Displacement, room:
     have more than `room` triangles."""
     if not len(data.faces):
         return data
+    if _area(data, by) > room * LARGEST_TRIANGLE * _max_edge(data, by) ** 2:
+        raise _too_many(data, by, room)  # at once, and not after seconds in which most of them are made
     rows, faces, columns = _rows(data, smooth)
     try:
         rows, faces = subdivided(rows, faces, by.axes, _max_edge(data, by), room)
@@ -134,10 +137,14 @@ def _max_edge(data: MeshData, by: Displacement) -> float:
     return max(float(np.ptp(moved(corners, by.axes), axis=0).max()) / PARTS, 1e-30)
 
 
-def _too_many(data: MeshData, by: Displacement, room: int) -> InvalidDocument:
+def _area(data: MeshData, by: Displacement) -> float:
+    """Square metres in the world."""
     p = moved(data.vertices, by.axes)[data.faces]
-    area = float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()) / 2
-    enough = math.sqrt(DENSITY * area / max(room, 1))
+    return float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()) / 2
+
+
+def _too_many(data: MeshData, by: Displacement, room: int) -> InvalidDocument:
+    enough = math.sqrt(DENSITY * _area(data, by) / max(room, 1))
     detail = (
         f"edges of at most {_max_edge(data, by):.3g} m take more triangles than the {room} that SUNBOX_MAX_TRIANGLES "
         f"leaves for this mesh; {enough:.2g} m would do"

@@ -10,6 +10,7 @@ import trimesh
 
 from service.pack import pack
 from service.pack.edits.cache import PackCache
+from service.pack.geometry import displacement
 from service.problems import InvalidDocument
 from service.scene import Scene, parse_scene
 from service.streams.scene_diff import scene_diff
@@ -74,13 +75,17 @@ def test_a_closed_mesh_stays_closed(kind: str, smooth: bool) -> None:
     assert len(found) > 1000
 
 
-def test_what_has_no_room_is_refused_and_told_what_has() -> None:
+def test_what_has_no_room_is_refused_and_told_what_has(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidDocument) as caught:
-        triangles(mesh(**PLANE, max_edge=1e-3), limits=Few(1000))
+        triangles(mesh(**PLANE, max_edge=0.08), limits=Few(1000))
     (error,) = caught.value.errors
     assert error.pointer == "/shapes/0/max_edge" and "SUNBOX_MAX_TRIANGLES" in error.detail
     would_do = float(error.detail.split()[-4])
     assert 200 < len(triangles(mesh(**PLANE, max_edge=would_do), limits=Few(1000))) <= 1000
+    with monkeypatch.context() as without:
+        without.setattr(displacement, "subdivided", None)
+        with pytest.raises(InvalidDocument, match="SUNBOX_MAX_TRIANGLES"):
+            triangles(mesh(**PLANE, max_edge=1e-6))  # hopeless: refused before anything is cut
     few = triangles(mesh(**PLANE))  # as the mesh's size wants it
     assert 10_000 < len(few) < 200_000
 
