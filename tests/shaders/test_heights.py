@@ -151,3 +151,19 @@ def test_a_white_furnace_stays_white_under_steep_heights(gpu: Renderer, material
     white = image[image[..., 3] == 1][:, :3]
     error = white.std() / np.sqrt(len(white))
     assert white.mean() + 3 * error > 0.99 and white.mean() - 3 * error < 1.003, (white.mean(), error)
+
+
+@pytest.mark.parametrize("maps", [{}, {"normal_map": {"texture": "bent"}}], ids=["alone", "beside a normal map"])
+def test_a_coat_lies_on_the_relief(gpu: Renderer, maps: Any) -> None:
+    """A lamp mirrored in the coat alone is where the tilted plane mirrors it, whatever bends the base."""
+    coated = {"type": "principled", "base_color": 0, "specular": 0, "clearcoat": 1, "clearcoat_roughness": 0, **maps}
+    ball = {"type": "sphere", "center": [2 * 0.96, 0, 2 * 0.28], "radius": 0.2, "material": "lamp"}
+
+    def shot(**more: Any) -> float:
+        lamp = {"type": "diffuse", "albedo": 0, "emission": 1}
+        scene = document([QUAD, ball], {"m": {**coated, **more}, "lamp": lamp},
+                         textures=TEXTURES, camera=at([0, 0, 0], [0, 0, 3]))  # fmt: skip
+        return float(render(gpu, scene, 16, assets=IMAGES, width=8, height=8)[..., :3].mean())
+
+    assert shot() == 0
+    assert shot(height={"texture": "right", "scale": -1.5}) > 0.02  # the normal is (0.6, 0, 0.8)
