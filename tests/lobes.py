@@ -9,7 +9,7 @@ import pytest
 
 from gpu.layout.models import NUMBERS
 from tests import stats
-from tests.probing import materials
+from tests.probing import materials, openpbr
 
 D, METAL_ROUGH, BLINN_PHONG = NUMBERS["disney"], NUMBERS["metal_rough"], NUMBERS["blinn_phong"]
 PHONG = NUMBERS["phong"]
@@ -64,6 +64,23 @@ PRINCIPLED = {
         transmission=0.6,
     ),
 }  # fmt: skip
+
+BRUSHED = {"anisotropic": 0.8, "anisotropic_rotation": 30}
+RED_COAT = {"clearcoat": 0.8, "coat_color": (1, 0.3, 0.2), "clearcoat_roughness": 0.4}
+OPENPBR = {
+    "openpbr default": openpbr(),
+    "edge of metal": openpbr(metallic=1, base_color=(1, 0.7, 0.3), specular_color=(0.2, 0.5, 1), **BRUSHED),
+    "clay": openpbr(diffuse_roughness=1, base_color=(0.9, 0.5, 0.2), roughness=0.6),
+    "bright": openpbr(specular=12, specular_color=(1, 0.5, 0.2), roughness=0.5),
+    "openpbr glass": openpbr(transmission=1, attenuation_color=(1, 0.8, 0.6), roughness=0.5, **BRUSHED),
+    "bubble": openpbr(transmission=1, ior=0.7, roughness=0.4),
+    "red coat": openpbr(**RED_COAT, coat_anisotropy=0.7, coat_rotation=50, roughness=0.5),
+    "coated glass": openpbr(**RED_COAT, transmission=0.9, roughness=0.4),
+    "fuzz": openpbr(sheen=1, sheen_roughness=0.6, sheen_color=(1, 0.2, 0.4), base_color=0.1),
+    "fine fuzz": openpbr(sheen=1, sheen_roughness=0.15, specular=0),
+    "layers": openpbr(**RED_COAT, sheen=0.5, transmission=0.3, metallic=0.3, diffuse_roughness=0.5, roughness=0.5),
+}
+LAYERED = PRINCIPLED | OPENPBR
 
 
 class Grid:

@@ -18,6 +18,7 @@ from gpu.kernels.flag_table import FLAGS
 from gpu.kernels.source import SHADERS
 from gpu.layout import bindings
 from gpu.layout.bindings import Slot
+from gpu.layout.models import NUMBERS
 from gpu.picture import filters
 
 PROBES = Path(__file__).parent / "shaders" / "probes"
@@ -31,6 +32,7 @@ def with_sliders(model: str) -> frozenset[str]:
 DISNEY_FLAGS = with_sliders("HAS_DISNEY")
 # All flags of the production model.
 PRINCIPLED_FLAGS = with_sliders("HAS_PRINCIPLED") | {"HAS_ATTENUATION"}
+OPENPBR_FLAGS = with_sliders("HAS_OPENPBR")
 
 
 def materials(**members: Any) -> np.ndarray:
@@ -44,6 +46,13 @@ def materials(**members: Any) -> np.ndarray:
     for name, value in {**defaults, **members}.items():
         out[name] = value
     return out
+
+
+def openpbr(**members: Any) -> np.ndarray:
+    """One of the model `openpbr` with the specification's defaults, but for what is given."""
+    defaults = {"base_weight": 1, "base_color": 0.8, "specular": 1, "roughness": 0.3, "ior": 1.5, "sheen_color": 1}
+    defaults |= {"clearcoat_roughness": 0, "coat_ior": 1.6, "coat_color": 1, "coat_darkening": 1}
+    return materials(**{"model": NUMBERS["openpbr"], **defaults, **members})
 
 
 class Prober:
@@ -88,7 +97,7 @@ class Prober:
         blocks[1].bind_to_uniform_block(bindings.UNIFORM_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
             kernel[name].value = value
-        if "HAS_PRINCIPLED" in raised:
+        if features.needs_tables(raised):
             for unit, texture in self._tables.items():
                 texture.use(unit)
         lab = [] if microfacets is None else [linear_texture(self.context, microfacets, 4, "u4")]

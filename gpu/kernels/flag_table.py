@@ -297,9 +297,15 @@ _ROWS = (
     # It doubles the time of a sample where the tables of stretched lobes are looked up.
     Flag(
         "HAS_ANISOTROPIC",
-        _optional("anisotropic"),
+        lambda s: _optional("anisotropic")(s) or _optional("coat_anisotropy")(s),
         raised_with=_flags_of(model for model in _STRETCHED if not model.needs_tables),
         compiled_with=_flags_of(model for model in _STRETCHED if model.needs_tables),
+    ),
+    Flag(
+        "HAS_DIFFUSE_ROUGHNESS",
+        _optional("diffuse_roughness"),
+        raised_with=_flags_of(with_optional("diffuse_roughness")),
+        in_general=False,
     ),
     Flag("HAS_CLEARCOAT", _optional("clearcoat"), raised_with=_flags_of(with_optional("clearcoat"))),
     Flag(

@@ -86,6 +86,20 @@ MODELS = (
         has_members=True,
         optional=_LAYERS,
     ),
+    Model(
+        "openpbr",
+        8,
+        tuple(Lobe),
+        transmits=True,
+        may_be_delta=True,
+        depends_on_wo=True,
+        needs_tables=True,
+        has_terms=True,
+        has_coat_normals=True,
+        has_members=True,
+        optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness"),
+        in_general=False,
+    ),
 )
 FLAGGED = MODELS[1:]
 NUMBERS = {model.name: model.number for model in MODELS}

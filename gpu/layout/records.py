@@ -84,6 +84,14 @@ class Material(Record):
     cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
     alpha: f32  # parameter of microfacet's distribution; its f0 is specular_color, its diffuse base_color
     number: u32  # of the material in the scene: microfacet's record
+    # of openpbr, whose transmission_color is attenuation_color
+    coat_color: vec3  # what is left of light that crosses the coat twice, straight
+    coat_ior: f32
+    base_weight: f32
+    diffuse_roughness: f32
+    coat_darkening: f32
+    coat_anisotropy: f32
+    coat_rotation: f32  # degrees
 
 
 class Sphere(Record):

@@ -24,7 +24,8 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     for name in (
         "base_color", "roughness", "metallic", "subsurface", "specular", "specular_tint", "anisotropic", "sheen",
         "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
-        "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color",
+        "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color", "coat_color", "base_weight",
+        "diffuse_roughness", "coat_darkening", "coat_anisotropy",
     )
 } | {
     "shininess": LARGE,

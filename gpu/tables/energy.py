@@ -1,4 +1,4 @@
-"""Tables of the albedos of `principled`'s lobes, for the terms that compensate the energy that they lose.
+"""Tables of the albedos of the layered models' lobes, for the terms that compensate the energy that they lose.
 
 `gpu.tables.build.energy_tables` computes them into `energy.npz`. Runs without GL. The kernels' side is
 `shaders/bsdf/energy.glsl`.
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 FILE = Path(__file__).with_name("energy.npz")
+FUZZ_FILE = Path(__file__).with_name("fuzz.npy")
 
 MU_COUNT = 40  # cosines, as squares of equal steps
 ETA_COUNT = 25  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
@@ -36,13 +37,16 @@ class Tables:
     though seldom a little too low.
     `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; those of the
     loss are divided by the factor by which the true loss is greater, see `energy_tables`. `sheen` (roughness, mu):
-    the albedo of sheen.
+    the albedo of sheen. `fuzz` (roughness, cosine, 3), even steps of both: two numbers of a linear transform of a
+    cosine and the albedo, as fitted to a layer of fibres by Zeltner, Burley and Chiang ("Practical Multiple-Scattering
+    Sheen Using Linearly Transformed Cosines", 2022; the figures are those of github.com/tizian/ltc-sheen, Apache-2.0).
     """
 
     albedo: np.ndarray
     stretched: np.ndarray
     mean: np.ndarray
     sheen: np.ndarray
+    fuzz: np.ndarray
 
 
 def mu_nodes(count: int = MU_COUNT) -> np.ndarray:
@@ -93,4 +97,4 @@ def tables() -> Tables:
     # The albedo with Fresnel 1 is the same for every index and is stored once.
     one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
     found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)
-    return Tables(**found)
+    return Tables(**found, fuzz=np.load(FUZZ_FILE))

@@ -24,6 +24,28 @@ RENAMED_IN = {
     "blinn_phong": {"specular": "phong_specular"},
     "phong": {"specular": "phong_specular"},
     "microfacet": {"alpha": "alpha", "f0": "specular_color"},
+    "openpbr": {
+        "base_diffuse_roughness": "diffuse_roughness",
+        "base_metalness": "metallic",
+        "specular_weight": "specular",
+        "specular_roughness": "roughness",
+        "specular_roughness_anisotropy": "anisotropic",
+        "specular_ior": "ior",
+        "transmission_weight": "transmission",
+        "transmission_color": "attenuation_color",
+        "coat_weight": "clearcoat",
+        "coat_roughness": "clearcoat_roughness",
+        "coat_roughness_anisotropy": "coat_anisotropy",
+        "fuzz_weight": "sheen",
+        "fuzz_color": "sheen_color",
+        "fuzz_roughness": "sheen_roughness",
+        "emission_color": "emission",
+        "geometry_opacity": "opacity",
+        "geometry_normal": "normal",
+        "geometry_tangent": "anisotropic_rotation",
+        "geometry_coat_normal": "coat_normal",
+        "geometry_coat_tangent": "coat_rotation",
+    },
 }
 SIDES = {"front": 1, "both": 2}
 
@@ -59,12 +81,12 @@ def pack_materials(scene: Scene) -> np.ndarray:
                 continue
             member = member_of(material, name)
             if member in layout.Material.members:
-                value = getattr(material, name)
+                value = material.value(name)
                 if isinstance(value, ScalarTexture | ColorTexture):
                     value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
-        if isinstance(material, SolidSurface):
+        if isinstance(material, SolidSurface) or material.alpha_cutoff is None:
             record["cutoff"] = layout.ABSENT
         elif isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
             record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that

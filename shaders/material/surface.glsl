@@ -23,7 +23,8 @@ struct Surface {
 #endif
 #if ANY_NEEDS_TABLES   // set for models that look up the tables of energy.glsl
     float eta_outside;     // index inside over outside
-    bool inside;           // wo is inside a body that transmits
+    float excess;          // share of what an index of ENERGY_LARGEST_ETA passes that is reflected besides
+    bool inside;           // wo is on the denser side of a boundary that transmits
     bool is_delta;         // the base is perfectly smooth
     bool index_matched;    // the index is 1: rays pass as if nothing were there
     vec3 specular_color;

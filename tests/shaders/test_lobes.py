@@ -9,9 +9,10 @@ import pytest
 
 from gpu import Renderer
 from gpu.layout.bindings import Slot
+from gpu.layout.models import NUMBERS
 from tests import baseline, disney, stats
-from tests.lobes import BLINN_PHONG, METAL_ROUGH, PHONG, PRINCIPLED, ROWS, D, Grid
-from tests.probing import DISNEY_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
+from tests.lobes import BLINN_PHONG, LAYERED, METAL_ROUGH, PHONG, PRINCIPLED, ROWS, D, Grid
+from tests.probing import DISNEY_FLAGS, OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] not in (BLINN_PHONG, PHONG)]
 ANGLES = (0.0, 35.0, 70.0, 87.0)
@@ -35,8 +36,8 @@ def _ask(
 ) -> tuple[np.ndarray, np.ndarray]:
     asks = np.zeros((len(ask) + wo.size // 3, 4), np.float32)
     asks[:, :3] = np.concatenate([ask, wo.reshape(-1, 3)])
-    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row] if row in ROWS else PRINCIPLED[row]}
-    flags = FLAGS if row in ROWS else PRINCIPLED_FLAGS
+    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row] if row in ROWS else LAYERED[row]}
+    flags = FLAGS if row in ROWS else PRINCIPLED_FLAGS if row in PRINCIPLED else OPENPBR_FLAGS
     defines = {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
     f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=wo.size // 3 - 1)
@@ -117,17 +118,22 @@ def test_a_wrong_pdf_is_seen(prober: Prober) -> None:
 
 
 def _clear(row: str) -> float:
-    return float(PRINCIPLED[row]["transmission"][0])
+    return float(LAYERED[row]["transmission"][0])
+
+
+def _keyed(material: np.void) -> bool:
+    """Whether a layer of `openpbr` lies over the base: it leaves to the base what it does not reflect of wo alone."""
+    return bool(material["model"] == NUMBERS["openpbr"] and (material["clearcoat"] > 0 or material["sheen"] > 0))
 
 
 @pytest.mark.parametrize("inside", [0, 1])
-@pytest.mark.parametrize("row", PRINCIPLED)
-def test_principled_is_reciprocal(prober: Prober, row: str, inside: int) -> None:
+@pytest.mark.parametrize("row", [name for name, m in LAYERED.items() if not _keyed(m[0])])
+def test_layered_models_are_reciprocal(prober: Prober, row: str, inside: int) -> None:
     """f is symmetric; across the surface f of basic radiance over the square of the index on wi's side is."""
     if inside and not _clear(row):
         return
     rng = np.random.default_rng(2)
-    m = PRINCIPLED[row][0]
+    m = LAYERED[row][0]
     root = math.sqrt(0.08 * m["specular"])
     eta2 = (float(m["ior"]) if m["ior"] > 0 else (1 + root) / (1 - root)) ** 2
     for wo in _hemisphere(rng, 5):
@@ -146,8 +152,8 @@ def test_principled_is_reciprocal(prober: Prober, row: str, inside: int) -> None
             np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
 
 
-@pytest.mark.parametrize(("row", "angle"), [(row, angle) for row in PRINCIPLED for angle in (30.0, 50.0, 70.0)])
-def test_principled_samples_follow_their_pdf(prober: Prober, row: str, angle: float) -> None:
+@pytest.mark.parametrize(("row", "angle"), [(row, angle) for row in LAYERED for angle in (30.0, 50.0, 70.0)])
+def test_layered_samples_follow_their_pdf(prober: Prober, row: str, angle: float) -> None:
     """Over the whole sphere in cells of cosine and azimuth, from outside and from inside."""
     rng = np.random.default_rng(4)
     n, rows, columns, fine = 60_000, 20, 20, 32
@@ -168,7 +174,7 @@ def test_principled_samples_follow_their_pdf(prober: Prober, row: str, angle: fl
         expected = cells[..., 3] * n
         assert observed.sum() == pytest.approx(expected.sum(), abs=0.012 * n)
         p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()), 25.0)
-        assert p > stats.sidak(1e-3, 4 * len(PRINCIPLED)), f"chi-square p = {p:.2g}"
+        assert p > stats.sidak(1e-3, 4 * len(LAYERED)), f"chi-square p = {p:.2g}"
         weights = np.where(alive[:, None], f[:, :3] / np.where(alive, f[:, 3], 1)[:, None], 0)
         albedo, error = cells[..., :3].sum((0, 1)), weights.std(0) / math.sqrt(n)
         assert (np.abs(weights.mean(0) - albedo) < 4.5 * error + 5e-3 * albedo + 1e-6).all()

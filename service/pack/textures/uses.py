@@ -106,9 +106,10 @@ def _uv_set(scene: Scene, reference: Reference) -> int | None:
 
 def _tangent_set(material: Material, sets: Mapping[str, int | None]) -> int | None:
     """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic."""
-    for name in ("normal_map", "clearcoat_normal_map"):
-        if name in sets:
-            return sets[name] or 0
+    by_member = {member_of(material, key): uv_set for key, uv_set in sets.items()}
+    for name in texture_records.NORMALS:
+        if name in by_member:
+            return by_member[name] or 0
     return 0 if stretches(material) else None
 
 

@@ -7,6 +7,7 @@ parameters      parameters that several models share
 diffuse         the Lambertian model
 disney          the "principled" BRDF of 2012
 principled      the production model, with glass, coat and sheen: `disney` and more
+openpbr         OpenPBR Surface
 metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers
 phong           the first of these highlights
@@ -24,6 +25,7 @@ from service.scene.material.diffuse import DiffuseMaterial
 from service.scene.material.disney import DisneyMaterial
 from service.scene.material.metal_rough import MetalRoughMaterial
 from service.scene.material.microfacet import MicrofacetMaterial
+from service.scene.material.openpbr import OpenpbrMaterial
 from service.scene.material.phong import PhongMaterial
 from service.scene.material.principled import PrincipledMaterial
 from service.scene.material.surface import AnySurface
@@ -33,6 +35,7 @@ Material = Annotated[
     DiffuseMaterial
     | DisneyMaterial
     | PrincipledMaterial
+    | OpenpbrMaterial
     | MetalRoughMaterial
     | BlinnPhongMaterial
     | PhongMaterial
@@ -57,6 +60,7 @@ __all__ = [
     "Material",
     "MetalRoughMaterial",
     "MicrofacetMaterial",
+    "OpenpbrMaterial",
     "PhongMaterial",
     "PrincipledMaterial",
     "stretches",

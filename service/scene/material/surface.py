@@ -47,6 +47,10 @@ class AnySurface(Model):
         (name,) = get_args(cls.model_fields["type"].annotation)
         return str(name)
 
+    def value(self, name: str) -> Any:
+        """A parameter as the renderer takes it: the texture or the number of the document, unless a model says else."""
+        return getattr(self, name)
+
     @classmethod
     def chosen(cls, document: dict[str, Any], name: str, value: str) -> dict[str, Any]:
         """A document of the model with another value of a menu, and what follows from that."""

@@ -21,6 +21,7 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.index_matched = s.eta_outside < 1.0001;
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
+    s.excess = 0.0;
     s.transmission = 0.0;
     s.inside = false;
 #if HAS_TRANSMISSION
@@ -106,7 +107,7 @@ float principled_sheen_albedo(Surface s, float c) {
 void principled_face(vec3 wo, bool behind, inout Surface s) {
     base_side(behind, s);
     s.albedo = base_albedo(s, wo);
-    s.albedo_mean = energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+    s.albedo_mean = base_albedo_mean(s);
     // The layers lie on the outer side only.
     s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
     s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);

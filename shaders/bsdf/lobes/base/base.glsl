@@ -1,9 +1,22 @@
 // A base that mixes metal, a diffuse material under a dielectric, and glass, without the layers on it. What its model
 // decides are the reflectances: models_metal, models_metal_mean and models_tinted, and the Surface's clear_color.
 #if ANY_NEEDS_TABLES
-vec4 base_albedo(Surface s, vec3 w) {
-    return energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+// What the facets of the tables' last index reflect and lose, as those of a greater one do: the share `excess` of the
+// light that meets a facet is reflected whatever the angle.
+vec4 base_exceeded(Surface s, vec4 albedo) {
+    return vec4(albedo.x, mix(albedo.yzw, vec3(albedo.x, vec2(1.0 - albedo.x)), s.excess));
 }
+
+vec4 base_albedo(Surface s, vec3 w) {
+    return base_exceeded(s, energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside));
+}
+
+vec4 base_albedo_mean(Surface s) {
+    return base_exceeded(s, energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside));
+}
+
+// The mean of base_dielectric seen from outside.
+float base_dielectric_mean(Surface s) { return mix(fresnel_mean(s.eta_outside), 1.0, s.excess); }
 
 // Sets what depends on the side that the surface is seen from; `behind` is the inner side of its geometry.
 void base_side(bool behind, inout Surface s) {
@@ -14,12 +27,12 @@ void base_side(bool behind, inout Surface s) {
 }
 
 // The share of untinted light that comes back after all of what the facets of the dielectric lose.
-float base_clear(Surface s) { return multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x); }
+float base_clear(Surface s) { return multiscatter_fresnel(base_dielectric_mean(s), s.albedo_mean.x); }
 
 // The share that comes back of the light that single scattering loses between microfacets of the mixed base.
 vec3 base_multiscatter(Surface s) {
     vec3 metal = multiscatter_fresnel(models_metal_mean(s), s.albedo_mean.x);
-    vec3 tinted = multiscatter_fresnel(models_tinted(s, fresnel_mean(s.eta_outside)), s.albedo_mean.x);
+    vec3 tinted = multiscatter_fresnel(models_tinted(s, base_dielectric_mean(s)), s.albedo_mean.x);
     return mix(tinted * (1.0 - s.transmission), metal, s.metallic);
 }
 

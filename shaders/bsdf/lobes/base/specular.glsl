@@ -3,16 +3,19 @@
 // multiplies it back.
 #if ANY_NEEDS_TABLES
 
+// The dielectric's untinted reflectance at cosine c.
+float base_dielectric(Surface s, float c, float eta) { return mix(fresnel_dielectric(c, eta), 1.0, s.excess); }
+
 vec3 base_fresnel(Surface s, float c) {
-    vec3 clear = models_tinted(s, fresnel_dielectric(c, s.eta_outside));
+    vec3 clear = models_tinted(s, base_dielectric(s, c, s.eta_outside));
 #if HAS_TRANSMISSION
-    clear = mix(clear, models_tinted(s, fresnel_dielectric(c, s.eta)), s.transmission);
+    clear = mix(clear, models_tinted(s, base_dielectric(s, c, s.eta)), s.transmission);
 #endif
     return mix(clear, models_metal(s, c), s.metallic);
 }
 
 vec3 base_transmittance(Surface s, float c) {
-    return (1.0 - s.metallic) * s.transmission * (1.0 - fresnel_dielectric(c, s.eta)) * s.clear_color;
+    return (1.0 - s.metallic) * s.transmission * (1.0 - base_dielectric(s, c, s.eta)) * s.clear_color;
 }
 
 // The chance of reflecting rather than refracting at a facet that light hits at cosine c.

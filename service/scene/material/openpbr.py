@@ -1,0 +1,337 @@
+"""`openpbr`: OpenPBR Surface 1.1.1, with its names, ranges and defaults.
+
+https://academysoftwarefoundation.github.io/OpenPBR. Colours are linear Rec.709, as everywhere in a document, where the
+specification assumes ACEScg; lengths are metres. What the specification leaves open is in docs/rendering.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+
+from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.material.surface import AnySurface, EmissionSides
+from service.scene.numbers import BRIGHTEST, LARGEST, Vec3, check_number, described, vector_schema
+from service.scene.texture import (
+    AnyFactor,
+    AnyFraction,
+    AnyRadiometric,
+    AnyReflectance,
+    ColorTexture,
+    NormalTexture,
+    ScalarTexture,
+)
+
+NITS = 683.0  # cd/m^2 of 1 W/(m^2 sr) in the middle of the eye's sensitivity
+LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
+# Parameters of OpenPBR that need light inside of bodies.
+UNSUPPORTED = ("transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "subsurface_weight",
+               "subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy")  # fmt: skip
+UNSUPPORTED += ("transmission_dispersion_scale", "transmission_dispersion_abbe_number", "thin_film_weight",
+                "thin_film_thickness", "thin_film_ior", "geometry_thin_walled")  # fmt: skip
+
+Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
+Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
+
+
+def _tangent(value: Any) -> Vec3:
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise refusal(f"must be three numbers like [1, 0, 0], not {described(value)}")
+    x, y, z = (check_number(v, -LARGEST, LARGEST, name) for v, name in zip(value, "xyz", strict=True))
+    if x == 0 and y == 0:
+        raise refusal("must not be along the normal: x and y are both 0")
+    return x, y, z
+
+
+Tangent = Annotated[Vec3, PlainValidator(_tangent), WithJsonSchema(vector_schema(-LARGEST, LARGEST))]
+
+
+def _turn(tangent: Vec3) -> float:
+    """Its angle in degrees, counter-clockwise from the surface's own."""
+    return math.degrees(math.atan2(tangent[1], tangent[0]))
+
+
+class OpenpbrMaterial(AnySurface):
+    """OpenPBR Surface 1.1.1: fuzz over a coat over metal, plastic or glass."""
+
+    type: Literal["openpbr"]
+    base_weight: Annotated[
+        AnyFraction,
+        hint("Base weight", "A factor on the base colour.", group="Base", unit="", widget="slider"),
+    ] = 1.0
+    base_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Base colour",
+            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+            group="Base",
+            unit="",
+            widget="color",
+        ),
+    ] = (0.8, 0.8, 0.8)
+    base_diffuse_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Diffuse roughness",
+            "0 is Lambert's; above it flatter, as of clay or plaster.",
+            group="Base",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    base_metalness: Annotated[
+        AnyFraction,
+        hint(
+            "Metalness",
+            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+            group="Base",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    specular_weight: Annotated[
+        AnyFactor,
+        hint(
+            "Specular weight",
+            "A factor on what a dielectric reflects head-on, or a metal at all; none reflects more than all.",
+            group="Specular",
+            unit="",
+            widget="slider",
+            soft=1,
+        ),
+    ] = 1.0
+    specular_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Specular colour",
+            "Tints a dielectric's reflection, or a metal's near grazing angles.",
+            group="Specular",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    specular_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Roughness",
+            "0 is polished, 1 is matte; its square is the width of the highlight.",
+            group="Specular",
+            highlight=("roughness", None),
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.3
+    specular_roughness_anisotropy: Annotated[
+        AnyFraction,
+        hint(
+            "Anisotropy",
+            "Stretches the highlight along the tangent, as of brushed metal; above 0.9 is as 0.9.",
+            group="Specular",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    specular_ior: Annotated[
+        Index,
+        hint(
+            "Index of refraction",
+            "Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one.",
+            group="Specular",
+            unit="",
+            widget="slider",
+            soft=(1, 3),
+        ),
+    ] = 1.5
+    transmission_weight: Annotated[
+        AnyFraction,
+        hint(
+            "Transmission",
+            "Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction.",
+            group="Transmission",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    transmission_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Transmission colour",
+            "Tints light each time that it passes the surface.",
+            group="Transmission",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    coat_weight: Annotated[
+        AnyFraction,
+        hint("Coat", "How much of the surface a clear coat covers.", group="Coat", unit="", widget="slider"),
+    ] = 0.0
+    coat_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Coat colour",
+            "What is left of white light that passes the coat twice, straight.",
+            group="Coat",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    coat_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Coat roughness",
+            "Of the coat's own highlight; it makes those below rougher, too.",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    coat_roughness_anisotropy: Annotated[
+        AnyFraction,
+        hint(
+            "Coat anisotropy",
+            "Stretches the coat's highlight along the coat's tangent.",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    coat_ior: Annotated[
+        Index,
+        hint(
+            "Coat index", "Of the coat's refraction; lacquer is 1.5 to 1.6.",
+            group="Coat", unit="", widget="slider", soft=(1, 3),
+        ),
+    ] = 1.6  # fmt: skip
+    coat_darkening: Annotated[
+        AnyFraction,
+        hint(
+            "Coat darkening",
+            "How much the reflections inside the coat darken what lies under it; 1 is what they do.",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 1.0
+    fuzz_weight: Annotated[
+        AnyFraction,
+        hint("Fuzz", "How much of the surface fibres or dust cover.", group="Sheen", unit="", widget="slider"),
+    ] = 0.0
+    fuzz_color: Annotated[
+        AnyReflectance, hint("Fuzz colour", "Of the light that the fuzz reflects.", group="Sheen", unit="", widget="color")
+    ] = (1.0, 1.0, 1.0)  # fmt: skip
+    fuzz_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Fuzz roughness",
+            "How far it reaches from grazing angles inwards; cloth is low, dust high.",
+            group="Sheen",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.5
+    emission_luminance: Annotated[
+        Luminance,
+        hint(
+            "Emission",
+            "Luminance of white that leaves the front side: above 0 the shape is an area light.",
+            group="Emission",
+            unit="cd/m^2",
+            widget="slider",
+            soft=1000,
+        ),
+    ] = 0.0
+    emission_color: Annotated[
+        AnyRadiometric,
+        hint("Emission colour", "A factor on the emission.", group="Emission", unit="", widget="color", soft=1),
+    ] = (1.0, 1.0, 1.0)
+    emission_sides: EmissionSides = "front"
+    geometry_opacity: Annotated[
+        AnyFraction,
+        hint(
+            "Opacity",
+            "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            group="Geometry",
+            unit="",
+            widget="slider",
+        ),
+    ] = 1.0
+    geometry_normal: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint("Normal map", "Bends the surface's normal without moving the surface.", group="Geometry"),
+    ] = None
+    geometry_tangent: Annotated[
+        Tangent | None,
+        OMITTABLE,
+        hint(
+            "Tangent",
+            "Where anisotropy stretches highlights: x along growing u, y along growing v.",
+            group="Geometry",
+            unit="",
+            widget="vector",
+            absent="along u",
+        ),
+    ] = None
+    geometry_coat_normal: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint(
+            "Coat normal map",
+            "The coat's own; without it the coat is smooth over whatever is under it.",
+            group="Coat",
+        ),
+    ] = None
+    geometry_coat_tangent: Annotated[
+        Tangent | None,
+        OMITTABLE,
+        hint(
+            "Coat tangent",
+            "Where the coat's anisotropy stretches its highlights.",
+            group="Coat",
+            unit="",
+            widget="vector",
+            absent="along u",
+        ),
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_bodies(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            for name in UNSUPPORTED:
+                if name in value:
+                    raise refusal(f"{name} of OpenPBR is not supported yet; leave it out", f"/{name}")
+        return value
+
+    def value(self, name: str) -> Any:
+        found = super().value(name)
+        if name == "emission_color":
+            share = self.emission_luminance / NITS
+            if isinstance(found, ColorTexture):
+                return found.model_copy(update={"factor": tuple(share * x for x in found.factor)})
+            return tuple(share * x for x in found)
+        if name in ("geometry_tangent", "geometry_coat_tangent"):
+            return 0.0 if found is None else _turn(found)
+        return found
+
+    # What all models have, under the names that they have in common.
+    @property
+    def emission(self) -> Any:
+        return self.value("emission_color")
+
+    @property
+    def alpha(self) -> float | ScalarTexture:
+        return self.geometry_opacity
+
+    @property
+    def alpha_cutoff(self) -> None:
+        return None
+
+    @property
+    def anisotropic(self) -> Any:
+        """That of the base, or else of the coat."""
+        own = self.specular_roughness_anisotropy
+        return own if isinstance(own, ScalarTexture) or own > 0 else self.coat_roughness_anisotropy
