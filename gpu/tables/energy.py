@@ -38,8 +38,9 @@ class Tables:
     `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; those of the
     loss are divided by the factor by which the true loss is greater, see `energy_tables`. `sheen` (roughness, mu):
     the albedo of sheen. `fuzz` (roughness, cosine, 3), even steps of both: two numbers of a linear transform of a
-    cosine and the albedo, as fitted to a layer of fibres by Zeltner, Burley and Chiang ("Practical Multiple-Scattering
-    Sheen Using Linearly Transformed Cosines", 2022; the figures are those of github.com/tizian/ltc-sheen, Apache-2.0).
+    cosine and the albedo, of a layer of fibres, fitted by Zeltner, Burley and Chiang in "Practical
+    Multiple-Scattering Sheen Using Linearly Transformed Cosines" (2022); the figures are those of
+    github.com/tizian/ltc-sheen, Apache-2.0.
     """
 
     albedo: np.ndarray

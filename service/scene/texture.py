@@ -174,7 +174,7 @@ AnyRadiometric = Annotated[
 Reference = ScalarTexture | ColorTexture | NormalTexture | HeightTexture
 
 
-def references(material: Model) -> dict[str, Reference]:
+def references(material: Any) -> dict[str, Reference]:
     """A material's references to textures, by the name of the field."""
     found = ((name, material.value(name)) for name in type(material).model_fields)
     return {name: value for name, value in found if isinstance(value, _Reference)}  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""`openpbr`: it never gains light, its white loses little, its base is reciprocal, and the specification's closed forms."""
+"""`openpbr` never gains light, its white loses little, and the specification's closed forms hold."""
 
 from __future__ import annotations
 

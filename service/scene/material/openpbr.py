@@ -1,7 +1,7 @@
 """`openpbr`: OpenPBR Surface 1.1.1, with its names, ranges and defaults.
 
-https://academysoftwarefoundation.github.io/OpenPBR. Colours are linear Rec.709, as everywhere in a document, where the
-specification assumes ACEScg; lengths are metres. What the specification leaves open is in docs/rendering.md.
+https://academysoftwarefoundation.github.io/OpenPBR. Colours are linear Rec.709, as everywhere in a document, where
+the specification assumes ACEScg; lengths are metres. What the specification leaves open is in docs/rendering.md.
 """
 
 from __future__ import annotations
@@ -26,11 +26,13 @@ from service.scene.texture import (
 
 NITS = 683.0  # cd/m^2 of 1 W/(m^2 sr) in the middle of the eye's sensitivity
 LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
-# Parameters of OpenPBR that need light inside of bodies.
-UNSUPPORTED = ("transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "subsurface_weight",
-               "subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy")  # fmt: skip
-UNSUPPORTED += ("transmission_dispersion_scale", "transmission_dispersion_abbe_number", "thin_film_weight",
-                "thin_film_thickness", "thin_film_ior", "geometry_thin_walled")  # fmt: skip
+# Parameters of OpenPBR that the renderer has nothing for yet.
+UNSUPPORTED = (
+    "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "transmission_dispersion_scale",
+    "transmission_dispersion_abbe_number", "subsurface_weight", "subsurface_color", "subsurface_radius",
+    "subsurface_radius_scale", "subsurface_scatter_anisotropy", "thin_film_weight", "thin_film_thickness",
+    "thin_film_ior", "geometry_thin_walled",
+)  # fmt: skip
 
 Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
 Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
@@ -220,8 +222,9 @@ class OpenpbrMaterial(AnySurface):
         hint("Fuzz", "How much of the surface fibres or dust cover.", group="Sheen", unit="", widget="slider"),
     ] = 0.0
     fuzz_color: Annotated[
-        AnyReflectance, hint("Fuzz colour", "Of the light that the fuzz reflects.", group="Sheen", unit="", widget="color")
-    ] = (1.0, 1.0, 1.0)  # fmt: skip
+        AnyReflectance,
+        hint("Fuzz colour", "Of the light that the fuzz reflects.", group="Sheen", unit="", widget="color"),
+    ] = (1.0, 1.0, 1.0)
     fuzz_roughness: Annotated[
         AnyFraction,
         hint(

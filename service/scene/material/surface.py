@@ -48,7 +48,7 @@ class AnySurface(Model):
         return str(name)
 
     def value(self, name: str) -> Any:
-        """A parameter as the renderer takes it: the texture or the number of the document, unless a model says else."""
+        """A parameter as the renderer takes it: as the document has it, unless a model says else."""
         return getattr(self, name)
 
     @classmethod
