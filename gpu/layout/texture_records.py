@@ -32,6 +32,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     "attenuation_distance": (1e-45, 1e9),
     "anisotropic_rotation": (-1e9, 1e9),
     "ior": (1.0, 4.0),
+    "coat_ior": (1.0, 4.0),
     "alpha": LARGE,  # what the distribution allows comes later, in bsdf/models/microfacet.glsl
 }  # fmt: skip
 NORMALS = ("normal", "coat_normal")

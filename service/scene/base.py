@@ -67,6 +67,7 @@ def hint(
     example: list[float] | None = None,
     highlight: tuple[Width, str | None] | None = None,
     new: dict[str, str] | None = None,
+    known_as: str | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -76,7 +77,8 @@ def hint(
     and how. `ranges` names a field with a choice, and the range for each of its values; `used` the choices with which
     the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is
     the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
-    is what the editor begins an entry of a table with.
+    is what the editor begins an entry of a table with. `known_as` is the name that other models have for the
+    parameter.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -109,6 +111,8 @@ def hint(
         extra["x-highlight"] = {"as": width} | ({} if color is None else {"color": color})
     if new is not None:
         extra["x-new"] = new
+    if known_as is not None:
+        extra["x-known-as"] = known_as
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

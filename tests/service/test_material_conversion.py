@@ -29,6 +29,7 @@ EVERY: list[dict[str, Any]] = [
         "specular": 1,
         "alpha": 0.1,
     },
+    {"type": "openpbr", "base_weight": 0.5, "base_metalness": 0.5, "coat_weight": 1, "emission_luminance": 100},
     {"type": "metal_rough", "base_color": {"texture": "wood"}, "metallic": 0, "roughness": {"texture": "wood"}},
     {"type": "blinn_phong", "diffuse": 0.2, "specular": [0.5, 0.4, 0.3], "shininess": 300},
     {"type": "phong", "diffuse": 0.2, "specular": [0.5, 0.4, 0.3], "shininess": 300},
@@ -141,3 +142,27 @@ def test_the_server_converts(server: Server) -> None:
     }
     refused = server.http.post("/v1/materials/convert", json={"material": METAL, "to": "velvet"})
     assert refused.status_code == 422 and "known are diffuse, disney" in refused.json()["errors"][0]["detail"]
+
+
+def test_principled_and_openpbr_say_the_same_in_other_words() -> None:
+    """What both can do comes back; a default that differs is written down."""
+    made, lost = asked({"type": "principled"}, "openpbr")
+    assert made == {"type": "openpbr", "base_color": [0.5, 0.5, 0.5], "specular_roughness": 0.5} and lost == []
+    old = {"type": "principled", "base_color": [0.9, 0.5, 0.1], "roughness": 0.2, "anisotropic": 0.5, "alpha": 0.5}
+    old |= {
+        "clearcoat": 0.5,
+        "clearcoat_roughness": 0.1,
+        "emission": [1, 2, 4],
+        "attenuation_distance": 2,
+        "ior": 1.6,
+    }
+    made, lost = asked(old, "openpbr")
+    assert lost == ["attenuation_distance"]
+    assert made["specular_roughness_anisotropy"] == 0.45 and made["emission_luminance"] == 2732
+    assert made["emission_color"] == [0.25, 0.5, 1] and made["geometry_opacity"] == 0.5
+    assert (made["coat_ior"], made["coat_darkening"], made["coat_roughness"]) == (1.5, 0, 0.1)
+    back, lost = asked(made, "principled")
+    assert lost == [] and {name: back[name] for name in old if name in back} == {
+        name: value for name, value in old.items() if name != "attenuation_distance"
+    }
+    assert asked({"type": "openpbr", "coat_weight": 1, "coat_color": 0.2}, "principled")[1] == ["coat_color"]

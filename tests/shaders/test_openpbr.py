@@ -11,7 +11,12 @@ from scipy.stats import qmc
 
 from gpu import Renderer
 from gpu.layout.bindings import Slot
-from tests.probing import OPENPBR_FLAGS, Prober, openpbr, prober_of
+from gpu.layout.models import NUMBERS
+from service.config import Config
+from service.problems import InvalidDocument
+from service.scene import parse_scene
+from tests.probing import OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, openpbr, prober_of
+from tests.rendering import document
 
 FRACTIONS = (
     "base_weight", "diffuse_roughness", "metallic", "roughness", "anisotropic", "transmission", "clearcoat",
@@ -157,3 +162,23 @@ def test_layers_of_weight_0_leave_the_bits(prober: Prober) -> None:
     plain = _grey(prober, [0.2, 0.9], 256)
     bare = {"coat_ior": 2, "coat_color": 0, "clearcoat_roughness": 0.7, "sheen_color": 0, "sheen_roughness": 0.1}
     assert (_grey(prober, [0.2, 0.9], 256, **bare) == plain).all()
+
+
+def test_a_plain_one_is_the_plain_principled(prober: Prober) -> None:
+    """Colour, roughness and index alone mean the same in both."""
+    cosines = [0.15, 0.5, 1.0]
+    asks = np.stack([cosines, [0] * 3, [0] * 3, [0] * 3], 1).astype(np.float32)
+    principled = materials(model=NUMBERS["principled"], base_color=0.6, roughness=0.4, ior=1.5)
+    told = prober.run(
+        "albedo.comp", 3, {Slot.SUM: asks, Slot.MATERIALS: np.repeat(principled, 3)}, (Slot.OUTPUT,), {},
+        PRINCIPLED_FLAGS, samples=4096,
+    )  # fmt: skip
+    found = _grey(prober, cosines, 4096, base_color=0.6, roughness=0.4)
+    np.testing.assert_allclose(found, told[0][:, 0], rtol=1e-5)
+
+
+def test_what_needs_light_inside_bodies_is_refused_by_name() -> None:
+    scene = document([], {"m": {"type": "openpbr", "subsurface_weight": 0.5}})
+    with pytest.raises(InvalidDocument) as refused:
+        parse_scene(scene, "", Config())
+    assert refused.value.errors[0].pointer == "/materials/m/subsurface_weight"

@@ -464,6 +464,75 @@ class NoiseTexture(TypedDict, total=False):
     """Another one is another pattern. (0 to 4.29497e+09, default 0)"""
 
 
+class OpenpbrMaterial(TypedDict, total=False):
+    """OpenPBR Surface 1.1.1: fuzz over a coat over metal, plastic or glass."""
+
+    type: Required[Literal["openpbr"]]
+    base_weight: float | ScalarTexture
+    """A factor on the base colour. (0 to 1, default 1.0)"""
+    base_color: list[float] | float | str | ColorTexture
+    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.8, 0.8,
+    0.8])"""
+    base_diffuse_roughness: float | ScalarTexture
+    """0 is Lambert's; above it flatter, as of clay or plaster. (0 to 1, default 0.0)"""
+    base_metalness: float | ScalarTexture
+    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    specular_weight: float | ScalarTexture
+    """A factor on what a dielectric reflects head-on, or a metal at all; none reflects more than all. (0 to 1e+20,
+    default 1.0)"""
+    specular_color: list[float] | float | str | ColorTexture
+    """Tints a dielectric's reflection, or a metal's near grazing angles. (0 to 1, default [1.0, 1.0, 1.0])"""
+    specular_roughness: float | ScalarTexture
+    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.3)"""
+    specular_roughness_anisotropy: float | ScalarTexture
+    """Stretches the highlight along the tangent, as of brushed metal; above 0.9 is as 0.9. (0 to 1, default 0.0)"""
+    specular_ior: float | ScalarTexture
+    """Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one. A texture gives 1 to 4. (0.001
+    to 1000, default 1.5)"""
+    transmission_weight: float | ScalarTexture
+    """Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default
+    0.0)"""
+    transmission_color: list[float] | float | str | ColorTexture
+    """Tints light each time that it passes the surface. (0 to 1, default [1.0, 1.0, 1.0])"""
+    coat_weight: float | ScalarTexture
+    """How much of the surface a clear coat covers. (0 to 1, default 0.0)"""
+    coat_color: list[float] | float | str | ColorTexture
+    """What is left of white light that passes the coat twice, straight. (0 to 1, default [1.0, 1.0, 1.0])"""
+    coat_roughness: float | ScalarTexture
+    """Of the coat's own highlight; it makes those below rougher, too. (0 to 1, default 0.0)"""
+    coat_roughness_anisotropy: float | ScalarTexture
+    """Stretches the coat's highlight along the coat's tangent. (0 to 1, default 0.0)"""
+    coat_ior: float | ScalarTexture
+    """Of the coat's refraction; lacquer is 1.5 to 1.6. (0.001 to 1000, default 1.6)"""
+    coat_darkening: float | ScalarTexture
+    """How much the reflections inside the coat darken what lies under it; 1 is what they do. (0 to 1, default 1.0)"""
+    fuzz_weight: float | ScalarTexture
+    """How much of the surface fibres or dust cover. (0 to 1, default 0.0)"""
+    fuzz_color: list[float] | float | str | ColorTexture
+    """Of the light that the fuzz reflects. (0 to 1, default [1.0, 1.0, 1.0])"""
+    fuzz_roughness: float | ScalarTexture
+    """How far it reaches from grazing angles inwards; cloth is low, dust high. (0 to 1, default 0.5)"""
+    emission_luminance: float
+    """Luminance that leaves the front side, times the colour: above 0 the shape is an area light. (cd/m^2, 0 to
+    1e+20, default 0.0)"""
+    emission_color: list[float] | float | str | ColorTexture
+    """A factor on the emission. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    geometry_opacity: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    geometry_normal: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+    geometry_tangent: list[float]
+    """Where anisotropy stretches highlights: x along growing u, y along growing v."""
+    geometry_coat_normal: NormalTexture
+    """The coat's own; without it the coat is smooth over whatever is under it."""
+    geometry_coat_tangent: list[float]
+    """Where the coat's anisotropy stretches its highlights."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+
+
 class PhongMaterial(TypedDict, total=False):
     """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
 
@@ -698,6 +767,7 @@ Material = (
     DiffuseMaterial
     | DisneyMaterial
     | PrincipledMaterial
+    | OpenpbrMaterial
     | MetalRoughMaterial
     | BlinnPhongMaterial
     | PhongMaterial

@@ -42,6 +42,16 @@ class Parameter:
     is_required: bool
 
     @property
+    def known_as(self) -> str:
+        """The name by which other models may know it."""
+        return str(self.hints.get("x-known-as", self.name))
+
+    @property
+    def default(self) -> Any:
+        """What it is where a document leaves it out: None where the schema does not say."""
+        return self.hints.get("default")
+
+    @property
     def takes_texture(self) -> bool:
         return any("texture" in option.get("properties", {}) for option in self.options)
 
@@ -65,14 +75,22 @@ class Parameter:
 
 def converted(old: Document, before: type[AnySurface], after: type[AnySurface]) -> Converted:
     """`old`, a valid document of the model `before`, as one of the model `after`."""
+    if before is after:
+        return Converted(dict(old), [])
     was, wanted = parameters(before), parameters(after)
     material: Document = {"type": after.name()}
+    used = {"type"}
+    theirs = {p.known_as: p for p in was.values()}
     for name, parameter in wanted.items():
-        value = old.get(name)
-        fits = parameter.takes_texture or not isinstance(value, dict)
-        if value is not None and fits and parameter.means(was.get(name)):
+        other = theirs.get(parameter.known_as)
+        if other is None or not parameter.means(other):
+            continue
+        value = old.get(other.name)
+        if value is None and other.default != parameter.default:  # left out, it would look different
+            value = other.default
+        if value is not None and (parameter.takes_texture or not isinstance(value, dict)):
             material[name] = value
-    used = set(material)
+            used.add(other.name)
     given, own = _color_name(was, old), _color_name(wanted, {})
     if given and own and given not in material:
         material[own] = old.get(given, was[given].hints.get("default"))
@@ -84,6 +102,7 @@ def converted(old: Document, before: type[AnySurface], after: type[AnySurface]) 
     for name, parameter in wanted.items():  # what this model asks for and the other has not
         if parameter.is_required and name not in material and parameter.choices is None:
             material[name] = parameter.middle
+    used |= before.left(old, material) | after.taken(old, material)
     return Converted(material, [name for name in old if name not in used])
 
 

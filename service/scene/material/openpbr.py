@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
-from service.scene.material.surface import AnySurface, EmissionSides
+from service.scene.material import openpbr_words
+from service.scene.material.surface import AnySurface, EmissionSides, Height
 from service.scene.numbers import BRIGHTEST, LARGEST, Vec3, check_number, described, vector_schema
 from service.scene.texture import (
+    REFERENCE_TAG,
+    VALUE_TAG,
     AnyFactor,
     AnyFraction,
     AnyRadiometric,
@@ -22,9 +25,9 @@ from service.scene.texture import (
     ColorTexture,
     NormalTexture,
     ScalarTexture,
+    form_of,
 )
 
-NITS = 683.0  # cd/m^2 of 1 W/(m^2 sr) in the middle of the eye's sensitivity
 LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
 # Parameters of OpenPBR that the renderer has nothing for yet.
 UNSUPPORTED = (
@@ -35,6 +38,9 @@ UNSUPPORTED = (
 )  # fmt: skip
 
 Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
+AnyPositiveIndex = Annotated[
+    Annotated[Index, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
+]
 Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
 
 
@@ -88,6 +94,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Metalness",
             "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+            known_as="metallic",
             group="Base",
             unit="",
             widget="slider",
@@ -119,6 +126,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Roughness",
             "0 is polished, 1 is matte; its square is the width of the highlight.",
+            known_as="roughness",
             group="Specular",
             highlight=("roughness", None),
             unit="",
@@ -130,16 +138,18 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Anisotropy",
             "Stretches the highlight along the tangent, as of brushed metal; above 0.9 is as 0.9.",
+            known_as="anisotropic",
             group="Specular",
             unit="",
             widget="slider",
         ),
     ] = 0.0
     specular_ior: Annotated[
-        Index,
+        AnyPositiveIndex,
         hint(
             "Index of refraction",
-            "Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one.",
+            "Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one. A texture gives 1 to 4.",
+            known_as="ior",
             group="Specular",
             unit="",
             widget="slider",
@@ -151,6 +161,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Transmission",
             "Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction.",
+            known_as="transmission",
             group="Transmission",
             unit="",
             widget="slider",
@@ -168,7 +179,14 @@ class OpenpbrMaterial(AnySurface):
     ] = (1.0, 1.0, 1.0)
     coat_weight: Annotated[
         AnyFraction,
-        hint("Coat", "How much of the surface a clear coat covers.", group="Coat", unit="", widget="slider"),
+        hint(
+            "Coat",
+            "How much of the surface a clear coat covers.",
+            known_as="clearcoat",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     coat_color: Annotated[
         AnyReflectance,
@@ -185,6 +203,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Coat roughness",
             "Of the coat's own highlight; it makes those below rougher, too.",
+            known_as="clearcoat_roughness",
             group="Coat",
             unit="",
             widget="slider",
@@ -201,7 +220,7 @@ class OpenpbrMaterial(AnySurface):
         ),
     ] = 0.0
     coat_ior: Annotated[
-        Index,
+        AnyPositiveIndex,
         hint(
             "Coat index", "Of the coat's refraction; lacquer is 1.5 to 1.6.",
             group="Coat", unit="", widget="slider", soft=(1, 3),
@@ -219,17 +238,32 @@ class OpenpbrMaterial(AnySurface):
     ] = 1.0
     fuzz_weight: Annotated[
         AnyFraction,
-        hint("Fuzz", "How much of the surface fibres or dust cover.", group="Sheen", unit="", widget="slider"),
+        hint(
+            "Fuzz",
+            "How much of the surface fibres or dust cover.",
+            known_as="sheen",
+            group="Sheen",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     fuzz_color: Annotated[
         AnyReflectance,
-        hint("Fuzz colour", "Of the light that the fuzz reflects.", group="Sheen", unit="", widget="color"),
+        hint(
+            "Fuzz colour",
+            "Of the light that the fuzz reflects.",
+            known_as="sheen_color",
+            group="Sheen",
+            unit="",
+            widget="color",
+        ),
     ] = (1.0, 1.0, 1.0)
     fuzz_roughness: Annotated[
         AnyFraction,
         hint(
             "Fuzz roughness",
             "How far it reaches from grazing angles inwards; cloth is low, dust high.",
+            known_as="sheen_roughness",
             group="Sheen",
             unit="",
             widget="slider",
@@ -239,7 +273,7 @@ class OpenpbrMaterial(AnySurface):
         Luminance,
         hint(
             "Emission",
-            "Luminance of white that leaves the front side: above 0 the shape is an area light.",
+            "Luminance that leaves the front side, times the colour: above 0 the shape is an area light.",
             group="Emission",
             unit="cd/m^2",
             widget="slider",
@@ -256,6 +290,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Opacity",
             "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            known_as="alpha",
             group="Geometry",
             unit="",
             widget="slider",
@@ -264,7 +299,12 @@ class OpenpbrMaterial(AnySurface):
     geometry_normal: Annotated[
         NormalTexture | None,
         OMITTABLE,
-        hint("Normal map", "Bends the surface's normal without moving the surface.", group="Geometry"),
+        hint(
+            "Normal map",
+            "Bends the surface's normal without moving the surface.",
+            known_as="normal_map",
+            group="Geometry",
+        ),
     ] = None
     geometry_tangent: Annotated[
         Tangent | None,
@@ -274,7 +314,7 @@ class OpenpbrMaterial(AnySurface):
             "Where anisotropy stretches highlights: x along growing u, y along growing v.",
             group="Geometry",
             unit="",
-            widget="vector",
+            widget="number",
             absent="along u",
         ),
     ] = None
@@ -284,6 +324,7 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Coat normal map",
             "The coat's own; without it the coat is smooth over whatever is under it.",
+            known_as="clearcoat_normal_map",
             group="Coat",
         ),
     ] = None
@@ -295,10 +336,11 @@ class OpenpbrMaterial(AnySurface):
             "Where the coat's anisotropy stretches its highlights.",
             group="Coat",
             unit="",
-            widget="vector",
+            widget="number",
             absent="along u",
         ),
     ] = None
+    height: Height = None
 
     @model_validator(mode="before")
     @classmethod
@@ -312,13 +354,21 @@ class OpenpbrMaterial(AnySurface):
     def value(self, name: str) -> Any:
         found = super().value(name)
         if name == "emission_color":
-            share = self.emission_luminance / NITS
+            share = self.emission_luminance / openpbr_words.NITS
             if isinstance(found, ColorTexture):
                 return found.model_copy(update={"factor": tuple(share * x for x in found.factor)})
             return tuple(share * x for x in found)
         if name in ("geometry_tangent", "geometry_coat_tangent"):
             return 0.0 if found is None else _turn(found)
         return found
+
+    @classmethod
+    def left(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        return openpbr_words.leave(old, made)
+
+    @classmethod
+    def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        return openpbr_words.take(old, made)
 
     # What all models have, under the names that they have in common.
     @property

@@ -56,6 +56,17 @@ class AnySurface(Model):
         """A document of the model with another value of a menu, and what follows from that."""
         return document | {name: value}
 
+    @classmethod
+    def left(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        """Bring to `made`, a document of another model with what both know by one name, what else there is of `old`,
+        a document of this one; the names that were made use of."""
+        return set()
+
+    @classmethod
+    def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        """The same, where `made` is a document of this model."""
+        return set()
+
 
 class SolidSurface(AnySurface):
     """The base of models that have no opacity."""

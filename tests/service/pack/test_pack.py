@@ -64,6 +64,21 @@ MEMBERS = {
     ("phong", "specular"): "phong_specular",
     ("microfacet", "diffuse"): "base_color",
     ("microfacet", "f0"): "specular_color",
+    ("openpbr", "base_diffuse_roughness"): "diffuse_roughness",
+    ("openpbr", "base_metalness"): "metallic",
+    ("openpbr", "specular_weight"): "specular",
+    ("openpbr", "specular_roughness"): "roughness",
+    ("openpbr", "specular_roughness_anisotropy"): "anisotropic",
+    ("openpbr", "specular_ior"): "ior",
+    ("openpbr", "transmission_weight"): "transmission",
+    ("openpbr", "transmission_color"): "attenuation_color",
+    ("openpbr", "coat_weight"): "clearcoat",
+    ("openpbr", "coat_roughness"): "clearcoat_roughness",
+    ("openpbr", "coat_roughness_anisotropy"): "coat_anisotropy",
+    ("openpbr", "fuzz_weight"): "sheen",
+    ("openpbr", "fuzz_color"): "sheen_color",
+    ("openpbr", "fuzz_roughness"): "sheen_roughness",
+    ("openpbr", "geometry_opacity"): "opacity",
 }
 
 
@@ -84,9 +99,11 @@ def test_every_number_of_a_material_has_its_place(model):
     }
     if model == "microfacet":  # the rest has a record of its own
         own = {"emission", "diffuse", "f0", "ior"}
+    if model == "openpbr":  # its emission is a product, and its tangents become angles
+        own = {name for name in own if not name.startswith(("emission", "geometry"))} | {"geometry_opacity"}
     for i, name in enumerate(sorted(own)):
         coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name == "sheen_color"
-        value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.01 * i
+        value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.0101 * i
         material = {"type": model, **required, name: value}
         record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
         assert record["model"] == NUMBERS[model]
@@ -94,6 +111,15 @@ def test_every_number_of_a_material_has_its_place(model):
         assert places == [MEMBERS.get((model, name), name)]
         seen.update(places)
     assert seen == {MEMBERS.get((model, name), name) for name in own}
+
+
+def test_openpbr_shines_in_nits_and_its_tangents_are_angles():
+    material = {"type": "openpbr", "emission_luminance": 683, "emission_color": [1, 0.5, 2], "geometry_opacity": 0.5}
+    material |= {"geometry_tangent": [1, 1, 0], "geometry_coat_tangent": [0, -2, 1]}
+    record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
+    np.testing.assert_allclose(record["emission"], [1, 0.5, 2])
+    assert record["anisotropic_rotation"] == 45 and record["coat_rotation"] == -90
+    assert record["opacity"] == 0.5 and record["cutoff"] == layout.ABSENT
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from service.scene import parse_scene, parse_settings, schema
 from service.scene.base import Group
 
 WHOLE = schema()
-UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "s", "pixels"}
+UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "cd/m^2", "s", "pixels"}
 WIDGETS = {"slider", "color", "number", "angle"}
 
 
@@ -96,7 +96,10 @@ def test_colours_have_three_forms() -> None:
     assert forms[1]["minimum"] == 0 and forms[1]["maximum"] == 1
 
 
-UNTEXTURED = {"gamma", "ior", "conductor_eta", "conductor_k", "diffuse_roughness"}  # of `microfacet`
+UNTEXTURED = {
+    "MicrofacetMaterial": {"gamma", "ior", "conductor_eta", "conductor_k", "diffuse_roughness"},
+    "OpenpbrMaterial": {"emission_luminance", "geometry_tangent", "geometry_coat_tangent"},
+}
 
 
 def test_every_colour_and_number_of_a_material_may_be_a_texture() -> None:
@@ -104,7 +107,7 @@ def test_every_colour_and_number_of_a_material_may_be_a_texture() -> None:
         if not name.endswith("Material"):
             continue
         for field, prop in model["properties"].items():
-            if is_numeric(prop) and not (name == "MicrofacetMaterial" and field in UNTEXTURED):
+            if is_numeric(prop) and field not in UNTEXTURED.get(name, ()):
                 reference = "ColorTexture" if prop["x-widget"] == "color" else "ScalarTexture"
                 assert prop["anyOf"][-1] == {"$ref": f"#/$defs/{reference}"}, (name, field)
 
