@@ -18,7 +18,7 @@ def _cache() -> Path:
     numba alone would miss a change in a function or constant that comes from another file.
     """
     folder = Path(__file__).parent
-    names = ("accel/*.py", "layout/*.py", "tables/build/*.py")
+    names = ("accel/*.py", "layout/*.py", "tables/build/*.py", "tables/mip_levels.py")
     sources = [source for name in names for source in sorted(folder.glob(name))]
     digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -14,6 +14,7 @@ layout(std430, binding = SLOT_FIRST_HITS) buffer hit_buffer { uvec4 hits[]; };
 #include "material/height.glsl"
 #include "camera/camera.glsl"
 #include "shapes/transparency.glsl"
+#include "path/cone.glsl"
 
 void main() {
     uvec2 pixel;
@@ -37,13 +38,14 @@ void main() {
         if (hit.id != NONE) {
 #if HAS_TEXTURES
             vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-            texture_look(at, texels);
+            texture_look(at, cone_footprint(cone_after(cone_begin(d), hit.t), at, d), texels);
             Material m = texture_material(at, texels);
 #if HAS_HEIGHTS
             height_normal(at, at.ns);
 #endif
 #if HAS_NORMAL_MAPS
-            texture_normal(at, texels, at.ns);
+            float lost;
+            texture_normal(at, texels, at.ns, lost);
 #endif
 #else
             Material m = material_load(at.material);

@@ -21,6 +21,7 @@ BASE = layout.Material.words // 4  # groups of four words of a material without 
 SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
 ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS, texture_records.HEIGHT)
 APART = (*texture_records.OTHER_RANGES, texture_records.HEIGHT)  # not sampled with what a surface is made from
+POINTWISE = ("opacity", "cutoff", texture_records.HEIGHT)  # looked up at single points
 
 
 def records(textures: TextureArrays) -> tuple[np.ndarray, np.ndarray]:
@@ -39,6 +40,10 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
     out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
     surface = [slot for name, slot in slots.items() if name not in APART]
+    out["ANY_FOOTPRINTS"] = int(any(name not in POINTWISE for name in slots))
+    flags = np.bitwise_or.reduce(records(textures)[0]["flags"], axis=None) if textures is not None and slots else 0
+    out["ANY_CLAMPED"] = int(flags & texture_records.SLOT_CLAMP > 0)
+    out["ANY_MIRRORED"] = int(flags & texture_records.SLOT_MIRROR > 0)
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(textures)}u"

@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+import math
+
 from gpu.layout.record import Record, f32, u32, vec3, vec4
 
 SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
+SLOT_NORMALS, SLOT_LEVELS = 1 << 6, 1 << 7  # an image of normals, and one with mip levels
 # Of slots that have a recipe: noise, solid or not, with creases or not; coordinates as colours; and a ramp over these
 # or over an image or a checker. The number of the recipe, that of the slot, stands above them.
 SLOT_NOISE, SLOT_SOLID, SLOT_TURBULENCE, SLOT_COORDINATES = (1 << i for i in range(8, 12))
@@ -49,7 +52,7 @@ class TextureSlot(Record):
     height: u32
     flags: u32  # SLOT_*
     turn: vec4  # 2 x 2, row by row
-    color_a: vec3  # of a checker or a noise
+    color_a: vec3  # of a checker or a noise; x and y of an image with mip levels are its `level_powers`
     offset_u: f32
     color_b: vec3
     offset_v: f32
@@ -74,3 +77,20 @@ class TextureRecipe(Record):
     amplitude: f32  # factor on the sum of the octaves
     ramp_offset: f32
     ramp_reads: vec4  # factors on the channels that the ramp reads
+
+
+def level_powers(width: int, height: int) -> tuple[int, int]:
+    """The logarithms of the powers of two nearest to an image's sides, as ratios."""
+    return round(math.log2(width)), round(math.log2(height))
+
+
+def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """(width, height) of each mip level, from the first one below the image down to a single texel. They stand one
+    after another behind the image; shaders compute where."""
+    across, down = level_powers(width, height)
+    return [(1 << max(across - k, 0), 1 << max(down - k, 0)) for k in range(1, max(across, down) + 1)]
+
+
+def level_texels(width: int, height: int) -> int:
+    """The texels of all mip levels: 1 / 3 of its own where its sides are powers of two, else up to 2 / 3."""
+    return sum(w * h for w, h in level_sizes(width, height))

@@ -70,6 +70,7 @@ class Dispatcher:
             s.roulette_depth,
             s.seed,
         )
+        uniforms["footprint_share"] = filters.FOOTPRINT[s.filter]
         uniforms["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
         uniforms["slot_width"] = s.width
         return uniforms

@@ -7,6 +7,9 @@ from functools import cache
 import numpy as np
 
 RADIUS = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "blackman_harris": 1.5}  # pixels
+# The part of a pixel's width over which one sample filters textures; a pixel's other samples cover the rest. Chosen
+# for a checker up to the horizon: 16 samples then err less than twice as much as 256, and these less than 0.015.
+FOOTPRINT = {"box": 0.4, "tent": 0.7, "gaussian": 0.9, "blackman_harris": 0.7}
 _GAUSSIAN_SIGMA = 0.5
 
 

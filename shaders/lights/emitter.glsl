@@ -93,7 +93,7 @@ vec3 emitter_texture(LightSample s, vec3 p) {
     vec3 q = p + s.t * s.wi;
     Hit hit = Hit(0.0, s.id, emitter_uv(s.id, q));
     SurfacePoint at = shapes_point(hit, q, vec3(0.0, 0.0, 1.0));
-    return texture_emission(at) * emitter_share(s, p, hit, at);
+    return texture_emission(at, footprint_none()) * emitter_share(s, p, hit, at);
 }
 #endif
 

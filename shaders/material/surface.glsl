@@ -52,6 +52,30 @@ vec3 surface_attenuation(Material m) {
     return vec3(0.0);
 }
 
+#if HAS_NORMAL_MAPS
+// A material whose facets' slopes vary by `base` more along each axis than its own numbers say, those of its coat by
+// `coat`. Variances add up, and alpha^2 is twice that of one axis [Tokuyoshi & Kaplanyan 2019, "Improved geometric
+// specular antialiasing", section 2]; an exponent n stands for alpha^2 = 2 / (n + 2) [Walter et al. 2007].
+void surface_roughen(float base, float coat, inout Material m) {
+    float more = 2.0 * base;
+    m.roughness = more > 0.0 ? min(sqrt(sqrt(sqr(sqr(m.roughness)) + more)), 1.0) : m.roughness;
+#if HAS_MICROFACET
+    m.alpha = more > 0.0 ? sqrt(sqr(m.alpha) + more) : m.alpha;
+#endif
+#if HAS_PHONG || HAS_BLINN_PHONG
+    m.shininess = more > 0.0 ? max(2.0 / (2.0 / (m.shininess + 2.0) + more) - 2.0, 0.0) : m.shininess;
+#endif
+#if HAS_CLEARCOAT
+    if (coat > 0.0) {
+        float gloss = sqrt(sqr(mix(0.1, 0.001, m.clearcoat_gloss)) + 2.0 * coat);
+        float rough = sqrt(sqrt(sqr(sqr(max(m.clearcoat_roughness, 0.0))) + 2.0 * coat));
+        if (m.clearcoat_roughness >= 0.0) m.clearcoat_roughness = min(rough, 1.0);
+        m.clearcoat_gloss = (0.1 - min(gloss, 1.0)) / (0.1 - 0.001);
+    }
+#endif
+}
+#endif
+
 // What holds for every model until its own NAME_surface says otherwise.
 Surface surface_plain(Material m) {
     Surface s;

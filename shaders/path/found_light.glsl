@@ -45,12 +45,12 @@ vec3 found_light_outside(vec3 d, float pdf, bool scattered) {
 }
 
 // Emission towards the side that a ray along d came from: the outward side, unless both sides of the material shine.
-vec3 found_light_emission(SurfacePoint at, vec3 d) {
+vec3 found_light_emission(SurfacePoint at, vec3 d, Cone cone) {
 #if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
     bool both = material_pick(at.material).emission_sides == 2u;
-    if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
+    if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at, cone_footprint(cone, at, d));
 #elif HAS_TEXTURED_LIGHTS
-    if (at.light != NONE && dot(d, at.ng) < 0.0) return texture_emission(at);
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return texture_emission(at, cone_footprint(cone, at, d));
 #elif HAS_EMISSION_BOTH
     Material m = material_pick(at.material);
     if (at.light != NONE && (dot(d, at.ng) < 0.0 || m.emission_sides == 2u)) return m.emission;
@@ -61,9 +61,9 @@ vec3 found_light_emission(SurfacePoint at, vec3 d) {
 }
 
 // Ambient radiance, a constant that some models add: both sides send it, and it is never sampled as a light.
-vec3 found_light_ambient(SurfacePoint at) {
+vec3 found_light_ambient(SurfacePoint at, vec3 d, Cone cone) {
 #if HAS_AMBIENT && HAS_TEXTURES
-    return texture_ambient(at);
+    return texture_ambient(at, cone_footprint(cone, at, d));
 #elif HAS_AMBIENT
     return material_pick(at.material).ambient;
 #else

@@ -51,7 +51,7 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.mapped = false;
 #if HAS_TEXTURES
     vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-    texture_look(path.at, texels);
+    texture_look(path.at, cone_footprint(path.cone, path.at, path.d), texels);
     m = texture_material(path.at, texels);
 #else
     m = material_pick(path.at.material);
@@ -61,11 +61,18 @@ Interaction interaction_make(inout Path path, out Material m) {
 #endif
 #if HAS_COAT_NORMALS
     SurfacePoint coat_at = path.at;
-    here.mapped = texture_coat_normal(path.at, texels, coat_at.ns) || here.mapped;
+    float coat_lost;
+    here.mapped = texture_coat_normal(path.at, texels, coat_at.ns, coat_lost) || here.mapped;
     here.coat = sides_normal(coat_at, wo_w);
 #endif
 #if HAS_NORMAL_MAPS
-    here.mapped = texture_normal(path.at, texels, path.at.ns) || here.mapped;
+    float lost;
+    here.mapped = texture_normal(path.at, texels, path.at.ns, lost) || here.mapped;
+#if HAS_COAT_NORMALS
+    surface_roughen(lost, coat_lost, m);
+#else
+    surface_roughen(lost, lost, m); // the coat has the base's normals
+#endif
 #endif
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);

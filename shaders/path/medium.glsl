@@ -48,7 +48,7 @@ Medium medium_at_camera() {
         more = hit.id != NONE && layer < MEDIUM_LAYERS && budget_lasts();
 #if HAS_TEXTURES
         vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-        texture_look(at, texels);
+        texture_look(at, footprint_none(), texels);
         Material m = texture_material(at, texels);
 #else
         Material m = material_pick(at.material);

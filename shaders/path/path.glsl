@@ -5,6 +5,7 @@
 #include "lights/lights.glsl"
 #include "shapes/transparency.glsl"
 #include "path/medium.glsl"
+#include "path/cone.glsl"
 #include "path/found_light.glsl"
 #include "path/sides.glsl"
 #include "path/path_extend.glsl"
@@ -33,6 +34,7 @@ Path path_begin(vec3 o, vec3 d, Medium medium) {
     path.counts = true;
     path.eta_scale = 1.0;
     path.medium = medium;
+    path.cone = cone_begin(d);
     return path;
 }
 

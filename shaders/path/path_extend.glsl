@@ -22,6 +22,7 @@ struct Path {
     // unchanged; the factor is not part of the throughput, so that roulette does not see it.
     float eta_scale;
     Medium medium;
+    Cone cone;
 };
 
 // A throughput below this may end the path by chance. It is below 1 because the variance of ended paths costs more than
@@ -48,10 +49,26 @@ void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
     }
 }
 
+// Gives the path the cone that goes on from the surface.
+void path_widen(BsdfSample next, Surface s, inout Path path) {
+#if ANY_FOOTPRINTS
+    float eta = 1.0;
+    bool crosses = false;
+#if ANY_TRANSMITS
+    eta = s.eta;
+    crosses = next.side < 0.0;
+#endif
+    Cone cone = cone_bent(path.cone, dot(path.at.ng, path.d) < 0.0 ? path.at.bend : -path.at.bend, eta, crosses);
+    if (!next.is_delta) cone = cone_scattered(cone, next.scatter.pdf);
+    path.cone = cone;
+#endif
+}
+
 // Takes the path on in the direction `next`. Where a light is sampled 1 / share times (path/direct.glsl), the density of
 // finding it by chance counts only that share.
 void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
     path.alive = next.valid;
+    path_widen(next, s, path);
     path.o = shapes_leave(path.at, next.d);
     path.d = next.d;
     path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;

@@ -6,11 +6,14 @@
 // Adds the emission and the ambient light of the surface that the path has reached.
 void path_add_emission(inout Path path) {
 #if HAS_EMISSION
-    vec3 arriving = found_light_emission(path.at, path.d) * direct_found_weight(path) * path.eta_scale;
+    // Where a light may have been sampled instead, both must find the same radiance: that of the point.
+    Cone cone = cone_none();
+    if (path.found_pdf >= PDF_DELTA) cone = path.cone;
+    vec3 arriving = found_light_emission(path.at, path.d, cone) * direct_found_weight(path) * path.eta_scale;
     if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
 #if HAS_AMBIENT
-    vec3 ambient = found_light_ambient(path.at) * path.eta_scale;
+    vec3 ambient = found_light_ambient(path.at, path.d, path.cone) * path.eta_scale;
     if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
 #endif
 }
@@ -22,6 +25,7 @@ void path_trace(Sampler rng, inout Path path) {
     if (!path.alive) path.hit.id = NONE; // the last surface has ended it, or this ray its budget
     bool met = path.hit.id != NONE;
     path.throughput *= medium_share(path.medium, path.hit.t);
+    path.cone = cone_after(path.cone, path.hit.t);
     path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
     path.alive = met && path.bounce < uniforms.max_bounces;
     if (path.bounce == 0u) path.alpha = met || path.escaped ? 1.0 : 0.0;

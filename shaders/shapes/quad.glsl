@@ -41,5 +41,10 @@ SurfacePoint quad_point(Quad q, vec3 p, uint id) {
     r.chart = mat2x3(q.u, q.v);
     r.chart_1 = mat2x3(0.0);
 #endif
+    shapes_plain(r);
+#if ANY_FOOTPRINTS
+    r.grow_u = q.dual_u / q.u_length;
+    r.grow_v = q.dual_v / q.v_length;
+#endif
     return r;
 }

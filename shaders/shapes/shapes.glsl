@@ -24,7 +24,27 @@ struct SurfacePoint {
     mat2x3 chart; // dp/du and dp/dv; 0: the surface has no such coordinates
     mat2x3 chart_1;
 #endif
+#if ANY_FOOTPRINTS
+    vec3 grow_u;  // how fast u grows over the surface, 1/m: its gradient
+    vec3 grow_v;
+    float bend;   // its curvature, 1/m, positive where it is a ball's from outside
+#if HAS_UVS_1
+    vec3 grow_u_1;
+    vec3 grow_v_1;
+#endif
+#endif
 };
+
+// What holds where a shape's own function does not say otherwise.
+void shapes_plain(inout SurfacePoint r) {
+#if ANY_FOOTPRINTS
+    r.grow_u = r.grow_v = vec3(0.0);
+    r.bend = 0.0;
+#if HAS_UVS_1
+    r.grow_u_1 = r.grow_v_1 = vec3(0.0);
+#endif
+#endif
+}
 
 #include "math/basis.glsl"
 #include "material/material.glsl"
@@ -100,17 +120,25 @@ bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
 
 // The point of a ray that hits nothing.
 SurfacePoint shapes_none(vec3 p, vec3 n) {
-#if HAS_HEIGHTS
-    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
-                        vec4(1.0), mat2x3(0.0), mat2x3(0.0));
-#elif HAS_TEXTURES
-    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
-                        vec4(1.0));
-#elif HAS_ANISOTROPIC
-    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
-#else
-    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
+    SurfacePoint r;
+    r.p = p;
+    r.error = vec3(0.0);
+    r.ng = r.ns = n;
+    r.tangent = vec3(1.0, 0.0, 0.0);
+    r.material = r.shape = 0u;
+    r.light = r.flat_id = NONE;
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    r.handed = 1.0;
 #endif
+#if HAS_TEXTURES
+    r.uv = r.uv_1 = vec2(0.0);
+    r.color = vec4(1.0);
+#endif
+#if HAS_HEIGHTS
+    r.chart = r.chart_1 = mat2x3(0.0);
+#endif
+    shapes_plain(r);
+    return r;
 }
 
 // The point of a hit, unless it is one with a triangle.

@@ -14,6 +14,9 @@ vec3 solid_error(Solid s, mat3 axes) {
     return gamma_error(16.0) * (abs(s.center) + abs(axes[0]) + abs(axes[1]) + abs(axes[2]));
 }
 
+// A gradient in world space, from one in the solid's own.
+vec3 solid_gradient(Solid s, vec3 g) { return g.x * s.row_x + g.y * s.row_y + g.z * s.row_z; }
+
 SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
     SurfacePoint r;
     mat3 axes = solid_axes(s);
@@ -37,6 +40,7 @@ SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
 #if HAS_HEIGHTS
     r.chart = r.chart_1 = mat2x3(0.0);
 #endif
+    shapes_plain(r);
     return r;
 }
 
@@ -65,6 +69,12 @@ SurfacePoint ellipsoid_point(Solid s, vec3 p) {
 #endif
 #if HAS_HEIGHTS
     r.chart = solid_axes(s) * sphere_chart(q);
+#endif
+#if ANY_FOOTPRINTS
+    float by = inversesqrt(max(dot(t, t), 1e-12));
+    r.grow_u = solid_gradient(s, t) * (0.5 * INV_PI * by * by);
+    r.grow_v = solid_gradient(s, cross(q, t)) * (INV_PI * by);
+    r.bend = (length(s.row_x) + length(s.row_y) + length(s.row_z)) / 3.0; // that of a ball of about its size
 #endif
     return r;
 }
@@ -103,6 +113,10 @@ SurfacePoint box_point(Solid s, vec3 p) {
 #endif
 #if HAS_HEIGHTS
     r.chart = solid_axes(s) * mat2x3(2.0 * t, 2.0 * b);
+#endif
+#if ANY_FOOTPRINTS
+    r.grow_u = 0.5 * solid_gradient(s, t);
+    r.grow_v = 0.5 * solid_gradient(s, b);
 #endif
     return r;
 }

@@ -78,5 +78,12 @@ SurfacePoint sphere_point(Sphere s, vec3 p) {
     r.chart = s.radius * mat2x3(basis_rotate(s.rotation, chart[0]), basis_rotate(s.rotation, chart[1]));
     r.chart_1 = mat2x3(0.0);
 #endif
+    shapes_plain(r);
+#if ANY_FOOTPRINTS
+    r.bend = 1.0 / s.radius;
+    float by = inversesqrt(max(dot(t, t), 1e-12)); // the tangent is as long as the circle of latitude is wide
+    r.grow_u = r.tangent * (0.5 * INV_PI * r.bend * by * by);
+    r.grow_v = cross(r.ng, r.tangent) * (INV_PI * r.bend * by);
+#endif
     return r;
 }

@@ -114,6 +114,40 @@ void triangle_chart(uint index, vec3 e1, vec3 e2, inout SurfacePoint r) {
 }
 #endif
 
+#if ANY_FOOTPRINTS
+#if HAS_UVS || HAS_UVS_1
+// The gradients of a triangle's barycentric weights of its second and third corner, from its edges there.
+void triangle_weights_grow(vec3 e1, vec3 e2, out vec3 g1, out vec3 g2) {
+    vec3 c = cross(e1, e2);
+    float inv = 1.0 / max(dot(c, c), 1e-37);
+    g1 = cross(e2, c) * inv;
+    g2 = cross(c, e1) * inv;
+}
+#endif
+
+// The gradients of the texture coordinates.
+void triangle_grow(uint index, vec3 e1, vec3 e2, inout SurfacePoint r) {
+#if HAS_UVS || HAS_UVS_1
+    vec3 g1, g2;
+    triangle_weights_grow(e1, e2, g1, g2);
+#endif
+#if HAS_UVS
+    vec2 uv = texelFetch(triangle_uvs, triangle_corner(index, 0u), 0).xy;
+    vec2 uv1 = texelFetch(triangle_uvs, triangle_corner(index, 1u), 0).xy - uv;
+    vec2 uv2 = texelFetch(triangle_uvs, triangle_corner(index, 2u), 0).xy - uv;
+    r.grow_u = uv1.x * g1 + uv2.x * g2;
+    r.grow_v = uv1.y * g1 + uv2.y * g2;
+#endif
+#if HAS_UVS_1
+    vec2 st = texelFetch(triangle_uvs_1, triangle_corner(index, 0u), 0).xy;
+    vec2 st1 = texelFetch(triangle_uvs_1, triangle_corner(index, 1u), 0).xy - st;
+    vec2 st2 = texelFetch(triangle_uvs_1, triangle_corner(index, 2u), 0).xy - st;
+    r.grow_u_1 = st1.x * g1 + st2.x * g2;
+    r.grow_v_1 = st1.y * g1 + st2.y * g2;
+#endif
+}
+#endif
+
 #if HAS_TANGENTS
 // The tangent of the k-th corner, whose normal has these bits. It is coded as an angle in that normal's plane, from the
 // x of the frame of [Duff et al. 2017]. The bits decide on the frame's sign, as they are the same on every device.
@@ -169,15 +203,25 @@ SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
 #if HAS_HEIGHTS
     triangle_chart(index, e1, e2, r);
 #endif
+    shapes_plain(r);
+#if ANY_FOOTPRINTS
+    triangle_grow(index, e1, e2, r);
+#endif
 #if HAS_SMOOTH_NORMALS
     TriangleNormals n = triangle_normals_load(index);
 #if HAS_INSTANCES
-    vec3 ns = b0 * instance_normal(it, triangle_decode(n.n0)) + uv.x * instance_normal(it, triangle_decode(n.n1))
-            + uv.y * instance_normal(it, triangle_decode(n.n2));
+    vec3 n0 = instance_normal(it, triangle_decode(n.n0)), n1 = instance_normal(it, triangle_decode(n.n1));
+    vec3 n2 = instance_normal(it, triangle_decode(n.n2));
 #else
-    vec3 ns = b0 * triangle_decode(n.n0) + uv.x * triangle_decode(n.n1) + uv.y * triangle_decode(n.n2);
+    vec3 n0 = triangle_decode(n.n0), n1 = triangle_decode(n.n1), n2 = triangle_decode(n.n2);
 #endif
+    vec3 ns = b0 * n0 + uv.x * n1 + uv.y * n2;
     if ((n.bits & NORMALS_SMOOTH) != 0u && dot(ns, ns) > 0.0) r.ns = normalize(ns);
+#if ANY_FOOTPRINTS
+    // The mean of what the normals turn along two edges, over their lengths.
+    float turned = dot(n1 - n0, e1) / dot(e1, e1) + dot(n2 - n0, e2) / dot(e2, e2);
+    if ((n.bits & NORMALS_SMOOTH) != 0u) r.bend = 0.5 * turned;
+#endif
 #if HAS_TANGENTS
 #if HAS_INSTANCES
     vec3 along = b0 * instance_tangent(it, triangle_decode(n.n0), triangle_tangent(n.n0, n.bits, 0u))

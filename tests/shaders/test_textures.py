@@ -284,7 +284,9 @@ def test_a_float_image_that_is_srgb_and_linear_is_there_twice() -> None:
     scene = scene_of({"a": {"asset": "floats", "color_space": "srgb"}, "b": {"asset": "floats"}},
                      {"albedo": {"texture": "a"}, "emission": {"texture": "b"}})  # fmt: skip
     made = pack(parse_scene(scene), Images(**IMAGES))
-    assert made.arrays.textures is not None and len(made.arrays.textures.floats) == 2 * 24
+    assert made.arrays.textures is not None and len(made.arrays.textures.floats) == 2 * (
+        24 + texture_records.level_texels(4, 6)
+    )
     beyond = int((IMAGES["floats"] > 1).any(axis=2).sum())
     assert made.warnings == [f"/materials/m/albedo: {beyond} texels of 'a' are clamped to 0..1"]
 
@@ -338,7 +340,17 @@ def test_a_scene_without_textures_has_nothing_of_them_in_its_kernel(entry: str) 
         defines = features.defines(features.flags(arrays), RenderSettings(8, 8), features.counts(arrays))
         texts.append(preprocessed(entry, defines))
     normal_maps = "bool mapped = false", "Scatter normal_map_eval"
-    for word in ("texture_", "TextureSlot", "uv_1", "handed", "vec4 texels[", *normal_maps):
+    for word in (
+        "texture_",
+        "TextureSlot",
+        "uv_1",
+        "Footprint ",
+        "grow_u",
+        "roughen",
+        "handed",
+        "vec4 texels[",
+        *normal_maps,
+    ):
         assert word not in texts[0].replace("_texture_", ""), word
     assert "texture_look" in texts[1]
 

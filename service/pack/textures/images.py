@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, field
@@ -9,6 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
+from gpu.layout.texture_records import level_texels
+from gpu.tables.mip_levels import Texels, mip_levels
 from service.assets import Assets, ImageData
 from service.colorimetry import decode_srgb
 from service.pack.edits.cache import PackCache, lasting
@@ -30,11 +33,14 @@ class TexelLimits(Protocol):
 
 @dataclass(frozen=True)
 class PackedTexels:
-    """All images of a scene; `places`: `TextureReference.key` -> (first texel among those of its kind, image)."""
+    """All images of a scene; `places`: `TextureReference.key` -> (first texel among those of its kind, image).
+
+    The mip levels of those in `averaged` follow each image."""
 
     texels: np.ndarray
     floats: np.ndarray
     places: dict[str, tuple[int, ImageData]] = field(default_factory=dict)
+    averaged: Mapping[str, Texels] = field(default_factory=dict)
 
 
 def images_of(scene: Scene, assets: Assets) -> dict[str, ImageData]:
@@ -58,38 +64,62 @@ def images_of(scene: Scene, assets: Assets) -> dict[str, ImageData]:
 
 
 def lay_out(
-    wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, limits: TexelLimits | None
+    wanted: dict[str, tuple[str, ImageData]],
+    averaged: Mapping[str, Texels],
+    cache: PackCache | None,
+    limits: TexelLimits | None,
 ) -> PackedTexels:
-    room = MAX_TEXELS if limits is None else min(limits.max_texels, MAX_TEXELS)
-    for name, image in wanted.values():
+    """The texels of images, by `TextureReference.key`, and the mip levels of those that are in `averaged`."""
+    allowed = MAX_TEXELS if limits is None else limits.max_texels
+    room, device_room = allowed, MAX_TEXELS
+    for kept, (name, image) in wanted.items():
         height, width = image.pixels.shape[:2]
-        if width * height > room:
-            detail = f"has {width} x {height} texels; this server has room for {room} more in a scene"
+        whole = width * height + (level_texels(width, height) if kept in averaged else 0)
+        if width * height > room or whole > device_room:
+            left = room if width * height > room else device_room
+            detail = f"has {width} x {height} texels; this server has room for {left} more in a scene"
             raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
-        room -= width * height
+        room, device_room = room - width * height, device_room - whole
     images = {kept: image for kept, (_, image) in wanted.items()}
     if cache is None or not images or not all(map(lasting, images)):
-        return _laid(images)
-    return cache.get(("texels", tuple(images)), lambda: _laid(images))
+        return _laid(images, averaged)
+    key = tuple((kept, averaged.get(kept)) for kept in images)
+    return cache.get(("texels", key), lambda: _laid(images, averaged))
 
 
-def _laid(images: dict[str, ImageData]) -> PackedTexels:
+def _laid(images: dict[str, ImageData], averaged: Mapping[str, Texels]) -> PackedTexels:
     places: dict[str, tuple[int, ImageData]] = {}
     ends = {True: 0, False: 0}
     for kept, image in images.items():
+        height, width = image.pixels.shape[:2]
         places[kept] = ends[image.is_8bit], _decoded(image) if kept.endswith(DECODED) else image
-        ends[image.is_8bit] += image.pixels.shape[0] * image.pixels.shape[1]
+        ends[image.is_8bit] += width * height + (level_texels(width, height) if kept in averaged else 0)
     out: dict[bool, np.ndarray] = {
         True: np.empty((ends[True], 4), np.uint8),
         False: np.empty((ends[False], 4), np.float32),
     }
-    for first, image in places.values():
-        height, width, channels = image.pixels.shape
-        part = out[image.is_8bit][first : first + width * height].reshape(height, width, 4)
-        for k in range(3):  # which takes a quarter of the time of all at once; a grey one comes three times
-            part[..., k] = image.pixels[..., min(k, channels - 1)]
-        part[..., 3] = image.pixels[..., 3] if channels == 4 else 255 if image.is_8bit else 1
-    return PackedTexels(out[True], out[False], places)
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for done in [
+            pool.submit(_fill, out[image.is_8bit][first:], image, averaged.get(kept))
+            for kept, (first, image) in places.items()
+        ]:
+            done.result()
+    return PackedTexels(out[True], out[False], places, averaged)
+
+
+def _fill(out: np.ndarray, image: ImageData, averaged: Texels | None) -> None:
+    """Write an image and its mip levels into the first of the texels `out`."""
+    height, width, channels = image.pixels.shape
+    part = out[: width * height].reshape(height, width, 4)
+    for k in range(3):  # which takes a quarter of the time of all at once; a grey one comes three times
+        part[..., k] = image.pixels[..., min(k, channels - 1)]
+    part[..., 3] = image.pixels[..., 3] if channels == 4 else 255 if image.is_8bit else 1
+    if averaged is not None:
+        at = width * height
+        for level in mip_levels(part, averaged):
+            texels = level.reshape(-1, 4)
+            out[at : at + len(texels)] = texels
+            at += len(texels)
 
 
 def _decoded(image: ImageData) -> ImageData:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gpu.layout import texture_records
+from gpu.tables.mip_levels import Texels
 from service.assets import ImageData
 from service.pack.parameters import member_of
 from service.problems import FieldError, InvalidDocument, escaped
@@ -24,7 +25,11 @@ from service.scene.texture import (
     references,
 )
 
-DECODED = " decoded"  # appended to the reference of an asset whose sRGB floats were made linear
+# Appended to the reference of an asset whose texels, or whose mip levels, are not those that stand under it alone.
+DECODED = " decoded"  # sRGB floats that were made linear
+NORMALS = " normals"  # averaged as vectors
+LINEAR = " linear"  # averaged as numbers, where others average the same bytes as sRGB
+POINTWISE = ("opacity", "cutoff", texture_records.HEIGHT)  # members looked up at single points, without mip levels
 
 
 @dataclass(frozen=True)
@@ -44,18 +49,25 @@ class TextureReference:
     srgb: bool  # bytes that the kernel decodes
     pointer: str
     bounds: tuple[float, float]  # that its values are clamped to
-    decoded: bool = False  # floats that are said to be sRGB
+    suffix: str = ""  # DECODED, NORMALS, LINEAR or none
 
     @property
     def key(self) -> str:
         """The key under which the texels of an image are stored."""
         assert isinstance(self.texture, ImageTexture)
-        return self.texture.asset + (DECODED if self.decoded else "")
+        return self.texture.asset + self.suffix
+
+    @property
+    def averaged(self) -> Texels | None:
+        """How the mip levels of an image are averaged; None where this reference needs none."""
+        if self.member in POINTWISE:
+            return None
+        return Texels.NORMALS if self.suffix == NORMALS else Texels.SRGB if self.srgb else Texels.LINEAR
 
     @property
     def look(self) -> tuple[str, bool]:
         """A key that is equal where one sample of the texture serves both references."""
-        return self.reference.texture, self.srgb
+        return self.reference.texture + self.suffix, self.srgb
 
 
 @dataclass(frozen=True)
@@ -122,7 +134,23 @@ def sampled(material: Material) -> dict[str, Reference]:
     return found
 
 
-def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureReference]:
+def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> list[TextureReference]:
+    uses = list(_uses(scene, images))
+    colored = {
+        use.texture.asset for use in uses if isinstance(use.texture, ImageTexture) and use.averaged is Texels.SRGB
+    }
+    return [
+        replace(use, suffix=LINEAR)
+        if isinstance(use.texture, ImageTexture)
+        and use.texture.asset in colored
+        and use.averaged is Texels.LINEAR
+        and not use.suffix
+        else use
+        for use in uses
+    ]
+
+
+def _uses(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureReference]:
     for i, (name, material) in enumerate(scene.materials.items()):
         for key, reference in sampled(material).items():
             whole = scene.textures[reference.texture]
@@ -138,9 +166,11 @@ def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureRe
             bounds = texture_records.TEXTURABLE.get(member, texture_records.UNIT)
             if isinstance(material, MicrofacetMaterial) and key == "alpha":
                 bounds = material.alpha_range
-            decoded = srgb and not is_8bit
+            suffix = DECODED if srgb and not is_8bit else ""
+            if isinstance(reference, NormalTexture) and isinstance(whole, ImageTexture) and not srgb:
+                suffix = NORMALS
             seen = texture, ramp, read
-            yield TextureReference(i, member, reference, *seen, srgb and is_8bit, pointer, bounds, decoded)
+            yield TextureReference(i, member, reference, *seen, srgb and is_8bit, pointer, bounds, suffix)
 
 
 def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gpu import TextureArrays
 from gpu.layout import texture_records
+from gpu.tables.mip_levels import Texels
 from service.assets import Assets, ImageData
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.parameters import member_of
@@ -37,18 +38,19 @@ def pack_textures(
 ) -> tuple[TextureArrays | None, list[TextureReference], PackedTexels, list[str]]:
     """The renderer's arrays or None, the references that they serve, and warnings. Raises InvalidDocument."""
     images = images_of(scene, assets)
-    uses = list(uses_of(scene, images))
+    uses = uses_of(scene, images)
     check_channels(uses, images)
     used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.name for use in uses if isinstance(use.texture, ImageTexture)}
-    texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
+    averaged = {use.key: use.averaged for use in uses if isinstance(use.texture, ImageTexture) and use.averaged}
+    texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, averaged, cache, limits)
     if not uses:
         return None, uses, texels, []
     slots = _slots(uses)
     stops = room_for_stops(uses)
     words = _words(len(scene.materials), uses, slots, texels, stops)
     write_uses(words, scene, slots)
-    key = " ".join(f"{kept}@{first}" for kept, (first, _) in texels.places.items())
+    key = " ".join(f"{kept}@{first}:{averaged.get(kept)}" for kept, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key, stops)
     return arrays, uses, texels, [*_image_warnings(wanted, images), *_warnings(uses, texels)]
@@ -124,8 +126,14 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     flags |= texture_records.SLOT_UV_1 if texture.uv == 1 else 0
     angle = math.radians(math.fmod(texture.rotation, 360.0))
     c, s = math.cos(angle), math.sin(angle)
-    record["first"], record["flags"] = first, flags
-    record["height"], record["width"] = image.pixels.shape[:2]
+    record["first"] = first
+    height, width = record["height"], record["width"] = image.pixels.shape[:2]
+    if use.key in texels.averaged:
+        across, down = texture_records.level_powers(width, height)
+        flags |= texture_records.SLOT_LEVELS
+        record["color_a"] = across, down, 0
+        flags |= texture_records.SLOT_NORMALS if texels.averaged[use.key] is Texels.NORMALS else 0
+    record["flags"] = flags
     record["turn"] = (c * texture.scale[0], -s * texture.scale[1], s * texture.scale[0], c * texture.scale[1])
     record["offset_u"], record["offset_v"] = texture.offset
     return record
