@@ -8,6 +8,7 @@ from contextvars import ContextVar
 import numpy as np
 import pytest
 
+from gpu.layout import texture_records
 from service.assets import ImageData
 from service.pack import pack
 from service.problems import AssetError, InvalidDocument
@@ -54,7 +55,8 @@ def test_two_images_are_read_at_a_time() -> None:
     REQUEST.set("mine")
     arrays = pack(parse_scene(textured(first="a", second="b")), assets).arrays
     assert arrays.textures is not None
-    assert len(arrays.textures.texels) == 2 * PIXELS.shape[0] * PIXELS.shape[1]
+    height, width = PIXELS.shape[:2]
+    assert len(arrays.textures.texels) == 2 * (width * height + texture_records.level_texels(width, height))
     assert assets.requests == ["mine", "mine"]
 
 
