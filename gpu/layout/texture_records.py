@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 
 from gpu.layout.record import Record, f32, u32, vec3, vec4
@@ -42,6 +43,14 @@ NORMALS = ("normal", "coat_normal")
 HEIGHT = "height"  # whose slopes bend both normals; sampled around a point, and not together with the others
 OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}
 TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
+
+
+class Texels(enum.Enum):
+    """What an image's numbers are."""
+
+    LINEAR = enum.auto()
+    SRGB = enum.auto()  # bytes whose colours are decoded; alpha is linear
+    NORMALS = enum.auto()
 
 
 class TextureSlot(Record):

@@ -6,24 +6,15 @@ averaged as unit vectors: the mean's direction is stored, and in alpha what was 
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Iterator
 
 import numpy as np
 
 from gpu.jit import jit
-from gpu.layout.texture_records import level_sizes
+from gpu.layout.texture_records import Texels, level_sizes
 
 MOST_OVERLAP = 4  # texels that one of the first level overlaps along a side: its ratio is at most 2 sqrt(2)
 GUESSES = 4096  # entries of the table in which the search for a byte begins; sRGB has at most 3 295 bytes per unit
-
-
-class Texels(enum.Enum):
-    """What an image's numbers are."""
-
-    LINEAR = enum.auto()
-    SRGB = enum.auto()  # bytes whose colours are decoded; alpha is linear
-    NORMALS = enum.auto()
 
 
 def mip_levels(image: np.ndarray, kind: Texels) -> Iterator[np.ndarray]:

@@ -13,8 +13,9 @@ from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS
 from gpu.layout import texture_records
 from gpu.layout.bindings import Slot
+from gpu.layout.texture_records import Texels
 from gpu.picture import filters
-from gpu.tables.mip_levels import Texels, mip_levels, srgb_of_bytes
+from gpu.tables.mip_levels import mip_levels, srgb_of_bytes
 from service.pack import pack
 from service.scene import parse_scene
 from tests.probing import PROBES

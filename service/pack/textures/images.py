@@ -10,8 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gpu.layout.texture_records import level_texels
-from gpu.tables.mip_levels import Texels, mip_levels
+from gpu.layout.texture_records import Texels, level_texels
 from service.assets import Assets, ImageData
 from service.colorimetry import decode_srgb
 from service.pack.edits.cache import PackCache, lasting
@@ -115,6 +114,8 @@ def _fill(out: np.ndarray, image: ImageData, averaged: Texels | None) -> None:
         part[..., k] = image.pixels[..., min(k, channels - 1)]
     part[..., 3] = image.pixels[..., 3] if channels == 4 else 255 if image.is_8bit else 1
     if averaged is not None:
+        from gpu.tables.mip_levels import mip_levels  # with numba, which scenes without images do not need
+
         at = width * height
         for level in mip_levels(part, averaged):
             texels = level.reshape(-1, 4)

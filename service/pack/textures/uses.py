@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from gpu.layout import texture_records
-from gpu.tables.mip_levels import Texels
+from gpu.layout.texture_records import Texels
 from service.assets import ImageData
 from service.pack.parameters import member_of
 from service.problems import FieldError, InvalidDocument, escaped

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import TextureArrays
 from gpu.layout import texture_records
-from gpu.tables.mip_levels import Texels
+from gpu.layout.texture_records import Texels
 from service.assets import Assets, ImageData
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.parameters import member_of
