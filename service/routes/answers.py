@@ -96,6 +96,7 @@ class Formats(BaseModel):
     images: list[str] = Field(description="Are read, for textures and environments.")
     luts: list[str] = Field(description="Are read as tables of colours, which `lut` names.")
     materials: list[str] = Field(description="Are read as materials.")
+    exports: list[str] = Field(description="Are written from scenes, by `POST /v1/export`.")
     compressions: list[str] = Field(description="Are read inside glTF files.")
     missing: dict[str, str] = Field(description="Formats that this server lacks a package for, with its name.")
 
