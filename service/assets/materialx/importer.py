@@ -12,7 +12,7 @@ from service.assets.materialx.graph import Graphs
 from service.assets.materialx.images import Images
 from service.assets.materialx.models import MODELS
 from service.assets.materialx.surface import Surface
-from service.assets.materialx.trees import Unsupported
+from service.assets.materialx.trees import Unsupported, times
 from service.assets.materialx.values import Values
 from service.assets.scenes.names import unique
 from service.assets.scenes.part_files import PartFiles
@@ -85,13 +85,22 @@ class _Reading:
         shader = given.getConnectedNode() if given is not None else None
         if shader is None:
             self.notes.add(graphs.place(material.getNamePath()), "the material has no surface shader; it is left out")
-        for name, detail in (
-            ("backsurfaceshader", "a shader of the back is not supported and is left out"),
-            ("displacementshader", "displacement is not supported and is left out"),
-        ):
-            if material.getInput(name) is not None:
-                self.notes.add(graphs.place(f"{material.getNamePath()}/{name}"), detail)
+        if material.getInput("backsurfaceshader") is not None:
+            place = graphs.place(f"{material.getNamePath()}/backsurfaceshader")
+            self.notes.add(place, "a shader of the back is not supported and is left out")
         return shader
+
+    def _displace(self, material: Any, surface: Surface, graphs: Graphs) -> None:
+        given = material.getInput("displacementshader")
+        shader = given.getConnectedNode() if given is not None else None
+        if shader is None:
+            return
+        place = graphs.place(f"{shader.getNamePath()}/displacement")
+        moved = shader.getInput("displacement")
+        if shader.getCategory() != "displacement" or moved is None or moved.getType() != "float":
+            self.notes.add(place, "displacement other than along the normal is not supported and is left out")
+            return
+        surface.height(times(graphs.input(shader, "displacement"), graphs.input(shader, "scale")), place)
 
     def _add(self, material: Any, shader: Any, graphs: Graphs) -> None:
         model, place = MODELS.get(shader.getCategory()), graphs.place(shader.getNamePath())
@@ -106,6 +115,7 @@ class _Reading:
             model(surface)
         except Unsupported as problem:
             raise ParseError(str(problem), place) from None
+        self._displace(material, surface, graphs)
         self.materials[unique(material.getName() or "material", self.materials)] = surface.material
 
     def nothing_left(self) -> ParseError:

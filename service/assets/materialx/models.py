@@ -191,9 +191,9 @@ def usd_preview_surface(s: Surface) -> None:
         own = normal.operation == "normalmap"
         map = normal if own else applied("normalmap", 3, scale=constant(1.0), **{"in": halved})
         s.normal("normal_map", "normal", map)
+    s.height(s.tree("displacement"), s.place("displacement"))
     s.lose([
         ("occlusion", 1, "ambient occlusion is left out: the light that reaches a corner is traced"),
-        ("displacement", 0, "displacement is not supported and is left out"),
     ])  # fmt: skip
 
 

@@ -93,6 +93,16 @@ class Surface:
         if map is not None:
             self.material[parameter] = map
 
+    def height(self, tree: Tree, place: str) -> None:
+        """Set the heights above the surface; only displaced shapes show them where a normal map shows the same."""
+        try:
+            found = self.values.height(tree, place)
+        except Unsupported as problem:
+            self.graphs.notes.add(place, f"{problem}; the heights are left out")
+            return
+        if found is not None:
+            self.material["height"] = found | ({"shading": False} if "normal_map" in self.material else {})
+
     def is_black(self, tree: Tree) -> bool:
         try:
             found = fixed(tree)

@@ -25,7 +25,7 @@ from service.assets.materialx.evaluation import (
     reads,
 )
 from service.assets.materialx.images import Images, srgb_bytes, texels_of
-from service.assets.materialx.trees import Tree, Unsupported, walk
+from service.assets.materialx.trees import Tree, Unsupported, constant, less, walk
 from service.assets.scenes.names import unique
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.warnings import Warnings
@@ -90,6 +90,25 @@ class Values:
             found = self._bake(source, place, 0.0, 1.0, "normals"), [1.0] * 3, [0, 1, 2]
         scale = float(scales[0])
         return {"texture": found[0]} | ({"scale": round(scale, 6)} if scale != 1 else {})
+
+    def height(self, tree: Tree, place: str) -> dict[str, Any] | None:
+        """Heights in metres; None where all are equal. The texture's value at which the tree is 0 is the midlevel.
+        Raises Unsupported."""
+        if fixed(tree) is not None:
+            return None
+        images = images_in(tree)
+        black = Places(np.zeros((1, 2), np.float32), texels={id(one): np.zeros((1, 4), np.float32) for one in images})
+        if len(images) != 1 or reads(tree, "texcoord", "heighttonormal", *GEOMETRY):
+            raise Unsupported("heights other than an image times a number and less another are not supported")
+        base = float(black.value(tree)[0, 0])
+        found = self._plain(less(tree, constant(base)))
+        if found is None or found[1][0] == 0:
+            raise Unsupported("heights other than an image times a number and less another are not supported")
+        name, (scale,), (channel,) = found
+        return {
+            "texture": name, "channel": "rgba"[channel], "scale": float(f"{scale:.7g}"),
+            "midlevel": float(f"{-base / scale:.6g}") + 0.0,
+        }  # fmt: skip
 
     def _clamped(self, value: Floats, place: str, low: float, high: float) -> list[float]:
         if not np.isfinite(value).all():

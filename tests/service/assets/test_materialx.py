@@ -167,6 +167,23 @@ def test_an_image_times_a_constant_stays_as_it_is(store: AssetStore) -> None:
     assert not imported.warnings
 
 
+def test_displacement_is_heights(store: AssetStore) -> None:
+    """A texture less its middle, times a scale: the midlevel is where that is 0."""
+    nodes = [
+        node("tiledimage", "img", "float", value("file", "h.png", "filename"), value("uvtiling", "2, 2", "vector2")),
+        node("subtract", "around", "float", wire("in1", "img", "float"), value("in2", 0.25)),
+    ]
+    moved = node(
+        "displacement", "D", "displacementshader", from_graph("displacement", "out", "float"), value("scale", 0.04)
+    )
+    wired = wire("displacementshader", "D", "displacementshader")
+    shader = surface("gltf_pbr").replace("</surfacematerial>", f"{wired}</surfacematerial>")
+    files = {"m.mtlx": mtlx(graph(*nodes, out="around float"), moved, shader), "h.png": make.png(NOISY)}
+    imported = taken(store, files)
+    assert material(imported)["height"] == {"texture": "h", "channel": "r", "scale": 0.04, "midlevel": 0.25}
+    assert imported.document["textures"]["h"]["scale"] == [2, 2] and not imported.warnings
+
+
 def test_the_colour_space_is_the_inputs_the_documents_or_linear(store: AssetStore) -> None:
     mid = [0.5, 0.5, 0.5]
     linear = ((0.5 + 0.055) / 1.055) ** 2.4
