@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, Work
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, Work
 
 from service.assets.errors import ParseError
 from service.assets.readers.raw_mesh import MAX_COORDINATE, RawMesh
@@ -243,9 +243,23 @@ class _Importer:
         return Usd.TimeCode(start)
 
     def _pose(self) -> None:
-        """Skinned meshes have their points where their skeletons put them."""
-        if any(prim.IsA(UsdSkel.Root) for prim in self.stage.Traverse()):
-            self.notes.add("", "skeletons are not supported; skinned meshes are shown as they were modelled")
+        """Move the points of skinned meshes to where their skeletons put them, in a layer of this process."""
+        roots = [prim for prim in self.stage.Traverse() if prim.IsA(UsdSkel.Root)]
+        if not roots:
+            return
+        moving = [prim for prim in self.stage.Traverse() if prim.IsA(UsdSkel.Animation)]
+        values = [value for prim in moving for value in prim.GetAuthoredAttributes()]
+        keys = sorted({key for value in values for key in value.GetTimeSamples()})
+        at = Gf.Interval.GetFullInterval()
+        if keys:  # skins are computed at keys only: the first one that is shown, or the last of all
+            start = self.time.GetValue() if self.time.IsNumeric() else keys[0]
+            shown = next((key for key in keys if key >= start), keys[-1])
+            self.time, at = Usd.TimeCode(shown), Gf.Interval(shown, shown)
+        self.stage.SetEditTarget(self.stage.GetSessionLayer())
+        for prim in roots:
+            if not UsdSkel.BakeSkinning(UsdSkel.Root(prim), at):
+                pointer = str(prim.GetPath())
+                self.notes.add(pointer, "its skeleton is broken; skinned meshes are shown as they were modelled")
 
 
 def _color(item: Item, time: Usd.TimeCode) -> list[float] | None:

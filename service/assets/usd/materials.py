@@ -91,7 +91,7 @@ class Materials:
             read = Reader(fallback, self.textures, self.notes)
             return preview_surface(read), read
         other: Node | None = rich or preview
-        what = f"its surface is {other.kind[:60] or 'code'}" if other else "it has no surface"
+        what = f"its surface is {other.kind[:60] or 'code'}" if other else "it has no surface of these"
         detail = f"the material is not supported ({what}); UsdPreviewSurface, standard_surface and OpenPBR are"
         self.notes.add(str(material.GetPath()), detail)
         return None

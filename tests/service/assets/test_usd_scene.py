@@ -116,6 +116,61 @@ def test_cages_are_smooth_and_said_to_be_cages(store: AssetStore) -> None:
     assert store.mesh(found.document["shapes"][0]["asset"]).normals is not None
 
 
+SKINNED = """
+def SkelRoot "Arm"
+{
+    def Skeleton "Bones" (
+        prepend apiSchemas = ["SkelBindingAPI"]
+    )
+    {
+        uniform token[] joints = ["Root", "Root/Tip"]
+        uniform matrix4d[] bindTransforms = [
+            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
+            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+        ]
+        uniform matrix4d[] restTransforms = [
+            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
+            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+        ]
+        rel skel:animationSource = </Arm/Walk>
+    }
+    def SkelAnimation "Walk"
+    {
+        uniform token[] joints = ["Root", "Root/Tip"]
+        float3[] translations.timeSamples = { 5: [(0, 0, 0), (0, 0, 3)], 9: [(0, 0, 0), (0, 0, 8)] }
+        quatf[] rotations = [(1, 0, 0, 0), (1, 0, 0, 0)]
+        half3[] scales = [(1, 1, 1), (1, 1, 1)]
+    }
+    def Mesh "Skin" (
+        prepend apiSchemas = ["SkelBindingAPI", "MaterialBindingAPI"]
+    )
+    {
+        QUAD
+        rel skel:skeleton = </Arm/Bones>
+        int[] primvars:skel:jointIndices = [0, 0, 1, 1] (
+            elementSize = 1
+            interpolation = "vertex"
+        )
+        float[] primvars:skel:jointWeights = [1, 1, 1, 1] (
+            elementSize = 1
+            interpolation = "vertex"
+        )
+    }
+}
+""".replace("QUAD", QUAD)
+
+
+@pytest.mark.parametrize("head", ["startTimeCode = 4\n    endTimeCode = 9", ""])
+def test_skinned_meshes_stand_as_their_skeletons_do_at_first(store: AssetStore, head: str) -> None:
+    found = imported(store, usda(SKINNED, f"metersPerUnit = 1\n    {head}"))
+    (shape,) = found.document["shapes"]
+    assert store.mesh(shape["asset"]).vertices[:, 2].tolist() == [0, 0, 3, 3]
+    still = SKINNED.replace("translations.timeSamples = { 5: [(0, 0, 0), (0, 0, 3)], 9: [(0, 0, 0), (0, 0, 8)] }",
+                            "translations = [(0, 0, 0), (0, 0, 7)]")  # fmt: skip
+    (shape,) = imported(store, usda(still)).document["shapes"]
+    assert store.mesh(shape["asset"]).vertices[:, 2].tolist() == [0, 0, 7, 7]
+
+
 def test_hidden_things_are_left_out(store: AssetStore) -> None:
     hidden = mesh("Guide", 'uniform token purpose = "guide"') + mesh("Proxy", 'uniform token purpose = "proxy"')
     off = f'def Xform "Off"\n{{\n token visibility = "invisible"\n{mesh("Inside")}\n}}\n'
