@@ -124,7 +124,7 @@ def test_the_environment_is_a_ball_in_a_ring_that_turns_it(editor: Editor) -> No
         const canvas = document.querySelector("#environment-ball canvas");
         return [...canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data].join();
     }"""
-    editor.wait("a ball", lambda: page.evaluate("document.querySelector('#environment-ball canvas').width") == 96)
+    editor.wait("a ball", lambda: page.evaluate("document.querySelector('#environment-ball canvas')?.width") == 96)
     before = page.evaluate(script)
     ring = page.get_by_role("slider", name="Turn of the ball")
     box = ring.bounding_box()

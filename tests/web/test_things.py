@@ -127,7 +127,8 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
         page.click("#open-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
     editor.wait("the model on a ground, and nothing else", lambda: things.count() == 2)
-    assert document(editor)["shapes"][1]["name"] == "Stage"
+    names = "the stage's name"
+    editor.wait(names, lambda: document(editor)["shapes"][1].get("name") == "Stage")
     editor.wait("what is said of it", lambda: "sky" in editor.text("#messages"))
     assert "wide" not in editor.text("#messages"), "the picture is as wide as the window in any case"
     with page.expect_file_chooser() as asked:

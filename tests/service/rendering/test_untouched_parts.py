@@ -28,6 +28,9 @@ SHELF = Shelf(**{
 })  # fmt: skip
 TEXTURES = {
     "image": {"asset": BYTES}, "other": {"asset": FLOATS}, "checker": {"type": "checker", "a": 0.2, "b": 0.9},
+    "noise": {"type": "noise"},
+    "ramp": {"type": "ramp", "stops": [{"position": 0.2, "color": 0.1}, {"position": 0.8, "color": 0.9}],
+             "input": {"texture": "noise"}},
 }  # fmt: skip
 MESH = {
     "type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]], "material": "m",
@@ -52,7 +55,7 @@ ENVIRONMENTS = [
     {"type": "cubemap", "assets": {f"{sign}{axis}": FLOATS for axis in "xyz" for sign in "pn"}},
     {"type": "sky", "sun_elevation": 30, "sun_azimuth": 40},
 ]  # fmt: skip
-MODELS = ("diffuse", "disney", "principled", "metal_rough", "blinn_phong", "phong", "microfacet")
+MODELS = ("diffuse", "disney", "principled", "metal_rough", "blinn_phong", "phong", "microfacet", "openpbr")
 REQUIRED = {
     "diffuse": {"albedo": 0.5}, "metal_rough": {"base_color": 0.5, "metallic": 0.5, "roughness": 0.5},
     "blinn_phong": {"diffuse": 0.4, "specular": 0.4, "shininess": 20},
@@ -66,6 +69,7 @@ VALUES = (
     [[0, 0, 0], [2, 0, 0], [0, 2, 1]],
     np.diag([2.0, 1, 1, 1]).ravel().tolist(),
     {"texture": "image"}, {"texture": "image", "factor": 0}, {"texture": "checker", "factor": 0.5},
+    [{"position": 0.5, "color": 0.3}, {"position": 1, "color": 0}],
     {"texture": "other", "scale": 0.5}, {"texture": "other", "channel": "g"}, {"translate": [0, 1, 0]},
 )  # fmt: skip
 
@@ -218,4 +222,4 @@ def test_what_is_not_named_is_packed_as_before() -> None:
         if name not in ("type", "name")  # names change nothing
         and not isinstance(field.annotation, type(BaseModel))  # whose own fields were changed
     }
-    assert not fields_of - met
+    assert not fields_of - met, sorted((m.__name__, n) for m, n in fields_of - met)
