@@ -1,8 +1,14 @@
-"""MaterialX files, written element by element."""
+"""MaterialX files, written element by element, and what is read from them."""
 
 from __future__ import annotations
 
 from html import escape
+from typing import Any
+
+from service.assets import AssetStore
+from service.assets.scene_import import Imported
+from service.scene.saved_material import check_saved_material
+from tests.obj_files import zipped
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39"{0}>\n'
 
@@ -51,3 +57,23 @@ def mtlx(*elements: str, space: str = "") -> bytes:
     """A document; `space` is its colour space."""
     head = HEAD.format(f' colorspace="{space}"' if space else "")
     return (head + "\n".join(elements) + "\n</materialx>").encode()
+
+
+def taken(store: AssetStore, files: bytes | dict[str, bytes]) -> Imported:
+    info = store.add(files if isinstance(files, bytes) else zipped(files))
+    assert info.kind == "materials"
+    imported = store.materials(info.id)
+    for name, material in imported.document["materials"].items():
+        shown = [each["texture"] for each in material.values() if isinstance(each, dict)]
+        textures = {each: imported.document["textures"][each] for each in shown}
+        check_saved_material({"materials": {name: material}, "textures": textures})
+    return imported
+
+
+def material(imported: Imported) -> dict[str, Any]:
+    (only,) = imported.document["materials"].values()
+    return only
+
+
+def losses(imported: Imported) -> set[str]:
+    return {warning["pointer"] for warning in imported.warnings}

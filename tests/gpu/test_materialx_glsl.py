@@ -46,6 +46,8 @@ NODES = [
     ("dodge", "color3", wire("fg", "hue") + value("bg", [0.1, 0.2, 0.3]) + value("mix", 0.8)),
     ("overlay", "color3", wire("fg", "hue") + value("bg", [0.1, 0.6, 0.3]) + value("mix", 0.8)),
     ("rotate2d", "vector2", wire("in", "far", "vector2") + value("amount", 33.0)),
+    ("rotate3d", "vector3",
+     wire("in", "deep", "vector3") + value("amount", 33.0) + value("axis", "1, 2, 3", "vector3")),
     ("place2d", "vector2", wire("texcoord", "far", "vector2") + value("rotate", 40.0)),
     ("ramp4", "color3", value("valuetl", [1.0, 0.0, 0.0]) + value("valuebr", [0.0, 0.5, 1.0])),
     ("checkerboard", "color3", UV), ("acescg_to_lin_rec709", "color3", wire("in", "hue")),

@@ -11,4 +11,5 @@ images      the images that a file names
 values      trees as numbers, colours and textures of a document
 surface     one surface shader, and the material that it becomes
 models      the standard library's surface models as `principled`
+openpbr     those two that are `openpbr` where that loses less
 """

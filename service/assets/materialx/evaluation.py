@@ -16,6 +16,7 @@ PROBES = 6
 CLOSE = 1e-5  # by how much a probe may differ from a linear function; single precision is 100 times as fine
 SOBEL = 1 / 16  # the scale of `heighttonormal`, as the library's GLSL has it
 GEOMETRY = ("position", "normal", "tangent", "bitangent", "viewdirection", "geomcolor")
+FRAME = {"tangent": (1.0, 0.0, 0.0), "bitangent": (0.0, 1.0, 0.0), "normal": (0.0, 0.0, 1.0)}
 WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "clamp"}
 
 
@@ -155,6 +156,18 @@ def fixed(tree: Tree) -> Floats | None:
     if any(one.operation in ("image", "texcoord", "heighttonormal", *GEOMETRY) for one in walk(tree)):
         return None
     found: Floats = Places(np.zeros((1, 2), np.float32)).value(tree)[0]
+    return found
+
+
+def in_frame(tree: Tree) -> Floats | None:
+    """(3,) the value of a tree that is made of the surface's own directions, in their frame; None for any other.
+    Raises Unsupported."""
+    own = [one for one in walk(tree) if one.operation in FRAME]
+    others = ("image", "texcoord", "heighttonormal", *(one for one in GEOMETRY if one not in FRAME))
+    if not own or any(one.operation in others for one in walk(tree)):
+        return None
+    known = {id(one): np.array([FRAME[one.operation]], np.float32) for one in own}
+    found: Floats = Places(np.zeros((1, 2), np.float32), _known=known).value(tree)[0]
     return found
 
 

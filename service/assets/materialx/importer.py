@@ -27,7 +27,7 @@ CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
 
 def read_materialx(names: Iterable[str], read: Callable[[str], bytes], limits: AssetLimits) -> SceneFile:
-    """The materials of the `.mtlx` files among `names`, each a `principled`. Raises ParseError."""
+    """The materials of the `.mtlx` files among `names`, each a `principled` or an `openpbr`. Raises ParseError."""
     check_library()
     names = list(names)
     sources = sorted(name for name in names if name.lower().endswith(SUFFIX))

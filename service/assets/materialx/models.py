@@ -1,5 +1,5 @@
-"""The surface models of the standard library as `principled`. Each formula is a tree, so that it holds for numbers
-and for textures alike. The table of docs/files.md says the same in words.
+"""The surface models of the standard library as `principled`, or as `openpbr` where that loses less. Each formula is
+a tree, so that it holds for numbers and for textures alike. The tables of docs/files.md say the same in words.
 """
 
 from __future__ import annotations
@@ -7,7 +7,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from service.assets.materialx.surface import Surface
+from service.assets.materialx import openpbr
+from service.assets.materialx.surface import DISPERSION, FILM, NITS, TANGENT, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -25,10 +26,6 @@ from service.assets.materialx.trees import (
 )
 
 COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
-NITS = 1 / 683  # watts of a lumen
-FILM = "thin films are not supported and are left out"
-DISPERSION = "dispersion is not supported and is left out"
-TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
 COAT_TINT = "the colour of the coat tints what is under it, at all angles alike"
 DARKER = "the coat does not darken what is under it"
 ONE_SIDED = (
@@ -342,9 +339,16 @@ def _tangent(s: Surface, *names: str) -> None:
             s.note(name, TANGENT)
 
 
-MODELS: dict[str, Callable[[Surface], None]] = {
-    "standard_surface": standard_surface,
-    "open_pbr_surface": open_pbr_surface,
+Reading = Callable[[Surface], None]
+
+
+def _either(suits: Callable[[Surface], bool], better: Reading, otherwise: Reading) -> Reading:
+    return lambda s: better(s) if suits(s) else otherwise(s)
+
+
+MODELS: dict[str, Reading] = {
+    "standard_surface": _either(openpbr.suits_standard, openpbr.standard_surface, standard_surface),
+    "open_pbr_surface": _either(openpbr.suits_open_pbr, openpbr.open_pbr_surface, open_pbr_surface),
     "gltf_pbr": gltf_pbr,
     "UsdPreviewSurface": usd_preview_surface,
     "disney_principled": disney_principled,

@@ -62,6 +62,14 @@ def _rotated(v: Values, tree: Tree) -> Any:
     return np.stack(np.broadcast_arrays(c * x + s * y, c * y - s * x), axis=-1)
 
 
+def _rotated_about(v: Values, tree: Tree) -> Any:
+    """Rodrigues' formula, for row vectors as the library has it: clockwise about the axis."""
+    turn, axis = np.radians(v["amount"]), v["axis"] / np.linalg.norm(v["axis"], axis=1, keepdims=True)
+    s, c = np.sin(turn), np.cos(turn)
+    along = (axis * v["in"]).sum(axis=1, keepdims=True)
+    return v["in"] * c + np.cross(v["in"], axis) * s + axis * along * (1 - c)
+
+
 def _chosen(better: Callable[[Floats, Floats], Any]) -> Operation:
     return lambda v, tree: np.where(better(v["value1"], v["value2"]), v["in1"], v["in2"])
 
@@ -195,6 +203,7 @@ OPERATIONS: dict[str, Operation] = {
     "crossproduct": lambda v, tree: np.cross(v["in1"], v["in2"]),
     "largest": lambda v, tree: v["in"].max(axis=1, keepdims=True),
     "rotate2d": _rotated,
+    "rotate3d": _rotated_about,
     "transformmatrix": _matrix,
     "combine2": _combined,
     "combine3": _combined,

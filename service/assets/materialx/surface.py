@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from service.assets.materialx.evaluation import fixed
+from service.assets.materialx.evaluation import fixed, in_frame
 from service.assets.materialx.graph import Graphs
 from service.assets.materialx.trees import Tree, Unsupported
 from service.assets.materialx.values import Values
 
+BRIGHTEST = 1e6
 # Ranges of parameters that are no shares, and colours without an upper end.
 RANGES = {
     "ior": (1.0, 4.0), "attenuation_distance": (1e-9, 1e9), "anisotropic_rotation": (-1e9, 1e9),
+    "specular_weight": (0.0, BRIGHTEST), "specular_ior": (1e-3, 1e3), "coat_ior": (1e-3, 1e3),
+    "emission_luminance": (0.0, 1e9),
 }  # fmt: skip
-BRIGHTEST = 1e6
-COLORS = ("base_color", "attenuation_color", "specular_color", "sheen_color", "emission")
+COLORS = (
+    "base_color", "attenuation_color", "specular_color", "sheen_color", "emission", "transmission_color",
+    "coat_color", "fuzz_color", "emission_color",
+)  # fmt: skip
+NITS = 1 / 683  # watts of a lumen
+FILM = "thin films are not supported and are left out"
+DISPERSION = "dispersion is not supported and is left out"
+TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
 
 
 @dataclass
 class Surface:
-    """A shader node. `material` collects the parameters of `principled`."""
+    """A shader node. `material` collects the parameters of `principled`, or of the model that a reader makes it."""
 
     node: Any
     graphs: Graphs
@@ -62,7 +72,7 @@ class Surface:
         return found is None or any(abs(one - neutral) > 1e-6 for one in found)
 
     def lose(self, names: Iterable[tuple[str, float, str]]) -> None:
-        """Say of each of these inputs, where it is not neutral, that `principled` has nothing for it."""
+        """Say of each of these inputs, where it is not neutral, that the model has nothing for it."""
         for name, neutral, detail in names:
             if self.is_used(name, neutral):
                 self.note(name, detail)
@@ -72,7 +82,7 @@ class Surface:
         place = self.place(name)
         try:
             if parameter in COLORS:
-                value = self.values.color(tree, place, BRIGHTEST if parameter == "emission" else 1.0)
+                value = self.values.color(tree, place, BRIGHTEST if parameter.startswith("emission") else 1.0)
             else:
                 value = self.values.number(tree, place, *RANGES.get(parameter, (0.0, 1.0)))
         except Unsupported as problem:
@@ -93,6 +103,23 @@ class Surface:
         if map is not None:
             self.material[parameter] = map
 
+    def tangent(self, parameter: str, name: str, degrees: float = 0.0) -> None:
+        """Set a tangent to that of an input, turned counter-clockwise; not where it is the surface's own."""
+        tree = self.tree(name)
+        try:
+            found = in_frame(tree) if tree.operation != "tangent" else np.array((1.0, 0.0, 0.0), np.float32)
+        except Unsupported:
+            found = None
+        x, y = (0.0, 0.0) if found is None else (float(found[0]), float(found[1]))
+        length = math.hypot(x, y)
+        if not 1e-6 < length < 1e9:
+            self.note(name, TANGENT)
+            x, y, length = 1.0, 0.0, 1.0
+        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        turned = [round(one / length, 6) + 0.0 for one in (c * x - s * y, s * x + c * y)]
+        if turned != [1.0, 0.0]:
+            self.material[parameter] = [*turned, 0.0]
+
     def height(self, tree: Tree, place: str) -> None:
         """Set the heights above the surface; only displaced shapes show them where a normal map shows the same."""
         try:
@@ -101,7 +128,10 @@ class Surface:
             self.graphs.notes.add(place, f"{problem}; the heights are left out")
             return
         if found is not None:
-            self.material["height"] = found | ({"shading": False} if "normal_map" in self.material else {})
+            self.material["height"] = found | ({"shading": False} if self._bends() else {})
+
+    def _bends(self) -> bool:
+        return "normal_map" in self.material or "geometry_normal" in self.material
 
     def is_black(self, tree: Tree) -> bool:
         try:

@@ -127,6 +127,12 @@ class Graph:
         scale = input_of("scale", number(value.scale)) if value.scale != 1 else ""
         return Value("vector3", node=self._node("normalmap", "vector3", input_to("in", "vector3", node), scale))
 
+    def tangent(self, degrees: float) -> Value:
+        """The surface's own, turned counter-clockwise; rotate3d turns the other way."""
+        own, about = self._node("tangent", "vector3"), self._node("normal", "vector3")
+        inputs = [input_to("in", "vector3", own), input_to("axis", "vector3", about)]
+        return Value("vector3", node=self._node("rotate3d", "vector3", *inputs, input_of("amount", number(-degrees))))
+
     def converted(self, value: Value, type: str) -> Value:
         """A number as a colour of three equal ones."""
         if not value.is_textured:

@@ -1,26 +1,29 @@
-"""`principled` as standard_surface and as open_pbr_surface: the inputs of each, which
+"""`principled` as standard_surface and `openpbr` as open_pbr_surface: the inputs of each, which
 `service/assets/materialx/models.py` reads again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from typing import Any
 
 from service.exports.materialx.graph import WHITE, Graph, Value, color, number
-from service.scene.material import PrincipledMaterial
+from service.scene.material import OpenpbrMaterial, PrincipledMaterial
 from service.scene.material.principled import index_of_specular, roughness_of_gloss
-from service.scene.texture import ColorTexture, ScalarTexture
+from service.scene.texture import ColorTexture, NormalTexture, ScalarTexture
 
 Inputs = dict[str, Value]
 STRETCH = 0.9  # of principled's anisotropy: alpha across the tangent is 1 - 0.9 a times that along it
-LUMENS = 683.0  # of a watt
+OWN = ("type", "emission_sides", "height")  # of our documents, not of the model
 
 
 def standard_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
-    made = _base(m, graph, {
-        "base": "base", "metalness": "metalness", "ior": "specular_IOR", "weight": "specular",
-        "transmission": "transmission",
-    })  # fmt: skip
+    made: Inputs = {"base": number(1.0), "base_color": graph.color(m.base_color, "base_color")}
+    if _is_used(m.metallic):
+        made["metalness"] = graph.number(m.metallic, "metallic")
+    if m.metallic != 1:
+        _dielectric(m, graph, made)
+    if _is_used(m.transmission):
+        _transmission(m, graph, made)
     made["specular_roughness"] = graph.number(m.roughness, "roughness")
     if _is_used(m.anisotropic):
         made["specular_anisotropy"] = _scaled(graph, m.anisotropic, "anisotropic", STRETCH)
@@ -30,85 +33,59 @@ def standard_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
         elif m.anisotropic_rotation:
             made["specular_rotation"] = number(m.anisotropic_rotation / 360)
     if _is_used(m.sheen):
-        made |= _sheen(m, graph, "sheen", "sheen_color", "sheen_roughness")
+        made |= _sheen(m, graph)
     if _is_used(m.clearcoat):
-        made |= _coat(m, graph, "coat", "coat_roughness", "coat_normal")
+        made |= _coat(m, graph)
     if _shines(m):
         made |= {"emission": number(1.0), "emission_color": graph.color(m.emission, "emission")}
     if m.alpha != 1:
         made["opacity"] = graph.converted(graph.number(m.alpha, "alpha"), "color3")
-    return made | _normal(m, graph, "normal")
-
-
-def open_pbr_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
-    made = _base(m, graph, {
-        "base": "base_weight", "metalness": "base_metalness", "ior": "specular_ior", "weight": "specular_weight",
-        "transmission": "transmission_weight",
-    })  # fmt: skip
-    roughness: Any = m.roughness
-    if _is_used(m.anisotropic):
-        made["specular_roughness_anisotropy"] = _scaled(graph, m.anisotropic, "anisotropic", STRETCH)
-        if isinstance(m.anisotropic, ScalarTexture):
-            graph.tell("roughness", "under a texture of anisotropy the highlight is wider than here")
-        else:
-            ratio = 1 - STRETCH * m.anisotropic
-            wider = (
-                2 * ratio / (1 + ratio * ratio)
-            ) ** -0.25  # OpenPBR 1.1: alpha along is r^2 sqrt(2 / (1 + ratio^2))
-            roughness = _product(roughness, wider)
-        if m.anisotropic_rotation != 0:
-            graph.tell(
-                "anisotropic_rotation", "open_pbr_surface turns the stretch by a tangent only; it is not turned"
-            )
-    made["specular_roughness"] = graph.number(roughness, "roughness")
-    if _is_used(m.sheen):
-        made |= _sheen(m, graph, "fuzz_weight", "fuzz_color", "fuzz_roughness")
-    if _is_used(m.clearcoat):
-        made |= _coat(m, graph, "coat_weight", "coat_roughness", "geometry_coat_normal")
-        made |= {"coat_ior": number(1.5), "coat_darkening": number(0.0)}
-    if _shines(m):
-        factor = m.emission.factor if isinstance(m.emission, ColorTexture) else m.emission
-        most = max(factor)
-        share = tuple(each / most for each in factor)
-        light = m.emission.model_copy(update={"factor": share}) if isinstance(m.emission, ColorTexture) else share
-        made |= {"emission_luminance": number(LUMENS * most), "emission_color": graph.color(light, "emission")}
-    if m.alpha != 1:
-        made["geometry_opacity"] = graph.number(m.alpha, "alpha")
-    return made | _normal(m, graph, "geometry_normal")
-
-
-def _base(m: PrincipledMaterial, graph: Graph, names: dict[str, str]) -> Inputs:
-    """What both models mean by the same words, but for their names."""
-    made: Inputs = {names["base"]: number(1.0), "base_color": graph.color(m.base_color, "base_color")}
-    if _is_used(m.metallic):
-        made[names["metalness"]] = graph.number(m.metallic, "metallic")
-    if m.metallic != 1:
-        _dielectric(m, graph, made, names)
-    if _is_used(m.transmission):
-        made[names["transmission"]] = graph.number(m.transmission, "transmission")
-        if m.attenuation_distance is None:
-            made["transmission_color"] = made["base_color"]
-        else:
-            if isinstance(m.attenuation_distance, ScalarTexture):
-                graph.tell("attenuation_distance", "a texture of it is not written; its factor is")
-            made["transmission_depth"] = number(_plain(m.attenuation_distance))
-            made["transmission_color"] = graph.color(m.attenuation_color, "attenuation_color")
-            if m.base_color != WHITE:
-                graph.tell(
-                    "base_color", "what it tints of the light that passes is not written beside an attenuation"
-                )
+    map = graph.normal(m.normal_map, "normal_map")
     _tell_others(m, graph)
+    return made | ({"normal": map} if map is not None else {})
+
+
+def open_pbr_surface(m: OpenpbrMaterial, graph: Graph) -> Inputs:
+    """What the document says, under the same names."""
+    made: Inputs = {}
+    for name in type(m).model_fields:
+        value = getattr(m, name)
+        if name not in m.model_fields_set or value is None or name in OWN:
+            continue
+        if name in ("geometry_tangent", "geometry_coat_tangent"):
+            made[name] = graph.tangent(math.degrees(math.atan2(value[1], value[0])))
+        elif isinstance(value, NormalTexture):
+            map = graph.normal(value, name)
+            made |= {name: map} if map is not None else {}
+        elif isinstance(value, tuple | ColorTexture):
+            made[name] = graph.color(value, name)
+        else:
+            made[name] = graph.number(value, name)
+    _tell_common(m, graph, m.emission_luminance > 0)
     return made
 
 
-def _dielectric(m: PrincipledMaterial, graph: Graph, made: Inputs, names: dict[str, str]) -> None:
+def _transmission(m: PrincipledMaterial, graph: Graph, made: Inputs) -> None:
+    made["transmission"] = graph.number(m.transmission, "transmission")
+    if m.attenuation_distance is None:
+        made["transmission_color"] = made["base_color"]
+        return
+    if isinstance(m.attenuation_distance, ScalarTexture):
+        graph.tell("attenuation_distance", "a texture of it is not written; its factor is")
+    made["transmission_depth"] = number(_plain(m.attenuation_distance))
+    made["transmission_color"] = graph.color(m.attenuation_color, "attenuation_color")
+    if m.base_color != WHITE:
+        graph.tell("base_color", "what it tints of the light that passes is not written beside an attenuation")
+
+
+def _dielectric(m: PrincipledMaterial, graph: Graph, made: Inputs) -> None:
     if m.ior is not None:
-        made[names["ior"]] = graph.number(m.ior, "ior")
+        made["specular_IOR"] = graph.number(m.ior, "ior")
     elif isinstance(m.specular, ScalarTexture):  # the reflectance is 0.08 of it
-        made[names["ior"]] = number(index_of_specular(1.0))
-        made[names["weight"]] = graph.number(m.specular, "specular")
+        made["specular_IOR"] = number(index_of_specular(1.0))
+        made["specular"] = graph.number(m.specular, "specular")
     else:
-        made[names["ior"]] = number(index_of_specular(m.specular))
+        made["specular_IOR"] = number(index_of_specular(m.specular))
     tint: Any = m.specular_color
     if _is_used(m.specular_tint):
         base, others = m.base_color, (m.specular_tint, tint)
@@ -123,43 +100,42 @@ def _dielectric(m: PrincipledMaterial, graph: Graph, made: Inputs, names: dict[s
             graph.tell("specular_color", "of what is a metal it tints the edges in the file")
 
 
-def _sheen(m: PrincipledMaterial, graph: Graph, weight: str, tint: str, roughness: str) -> Inputs:
-    made = {weight: graph.number(m.sheen, "sheen"), roughness: graph.number(m.sheen_roughness, "sheen_roughness")}
+def _sheen(m: PrincipledMaterial, graph: Graph) -> Inputs:
+    roughness = graph.number(m.sheen_roughness, "sheen_roughness")
+    made = {"sheen": graph.number(m.sheen, "sheen"), "sheen_roughness": roughness}
     if m.sheen_color is not None:
-        return made | {tint: graph.color(m.sheen_color, "sheen_color")}
+        return made | {"sheen_color": graph.color(m.sheen_color, "sheen_color")}
     if isinstance(m.sheen_tint, ScalarTexture) or (isinstance(m.base_color, ColorTexture) and m.sheen_tint):
         graph.tell("sheen_tint", "it is not written where it, or what it tints, is a texture")
         return made
-    return made | {
-        tint: color(WHITE if isinstance(m.base_color, ColorTexture) else _tinted(m.base_color, m.sheen_tint))
-    }
+    tint = WHITE if isinstance(m.base_color, ColorTexture) else _tinted(m.base_color, m.sheen_tint)
+    return made | {"sheen_color": color(tint)}
 
 
-def _coat(m: PrincipledMaterial, graph: Graph, weight: str, roughness: str, normal: str) -> Inputs:
-    made = {weight: graph.number(m.clearcoat, "clearcoat")}
+def _coat(m: PrincipledMaterial, graph: Graph) -> Inputs:
+    made = {"coat": graph.number(m.clearcoat, "clearcoat")}
     if m.clearcoat_roughness is not None:
-        made[roughness] = graph.number(m.clearcoat_roughness, "clearcoat_roughness")
+        made["coat_roughness"] = graph.number(m.clearcoat_roughness, "clearcoat_roughness")
     else:
         if isinstance(m.clearcoat_gloss, ScalarTexture):
             graph.tell("clearcoat_gloss", "a texture of it is not written; its factor is")
-        made[roughness] = number(roughness_of_gloss(_plain(m.clearcoat_gloss)))
+        made["coat_roughness"] = number(roughness_of_gloss(_plain(m.clearcoat_gloss)))
     map = graph.normal(m.clearcoat_normal_map, "clearcoat_normal_map")
-    return made | ({normal: map} if map is not None else {})
-
-
-def _normal(m: PrincipledMaterial, graph: Graph, name: str) -> Inputs:
-    map = graph.normal(m.normal_map, "normal_map")
-    return {name: map} if map is not None else {}
+    return made | ({"coat_normal": map} if map is not None else {})
 
 
 def _tell_others(m: PrincipledMaterial, graph: Graph) -> None:
     if _is_used(m.subsurface):
         graph.tell("subsurface", "a flatter diffuse reflection is not written")
     if m.alpha_cutoff is not None:
-        graph.tell("alpha_cutoff", "neither model has a cut-off; the opacity is written without it")
-    if _shines(m) and m.emission_sides == "both":
+        graph.tell("alpha_cutoff", "the model has no cut-off; the opacity is written without it")
+    _tell_common(m, graph, _shines(m))
+
+
+def _tell_common(m: PrincipledMaterial | OpenpbrMaterial, graph: Graph, shines: bool) -> None:
+    if shines and m.emission_sides == "both":
         graph.tell("emission_sides", "the file does not say on which sides a surface shines")
-    if getattr(m, "height", None) is not None:
+    if m.height is not None:
         graph.tell("height", "heights are not written")
 
 
@@ -182,20 +158,7 @@ def _plain(value: Any) -> float:
     return float(value.factor if isinstance(value, ScalarTexture) else value)
 
 
-def _product(value: Any, factor: float) -> Any:
-    if isinstance(value, ScalarTexture):
-        return value.model_copy(update={"factor": value.factor * factor})
-    return min(value * factor, 1.0)
-
-
 def _scaled(graph: Graph, value: Any, parameter: str, factor: float) -> Value:
     if isinstance(value, ScalarTexture):
         return graph.number(value.model_copy(update={"factor": value.factor * factor}), parameter)
     return number(value * factor)
-
-
-# In the order in which they are preferred where both lose as much: the newer one first.
-MODELS: dict[str, Callable[[PrincipledMaterial, Graph], Inputs]] = {
-    "open_pbr_surface": open_pbr_surface,
-    "standard_surface": standard_surface,
-}

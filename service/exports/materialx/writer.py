@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from service.exports.losses import Losses
 from service.exports.materialx.graph import Graph, Images, valid
-from service.exports.materialx.models import MODELS
+from service.exports.materialx.models import open_pbr_surface, standard_surface
 from service.exports.principled import as_principled
 from service.exports.writing import Exported, Files, Limits, check_size
 from service.problems import escaped
 from service.scene import Scene
+from service.scene.material import OpenpbrMaterial
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39" colorspace="lin_rec709">\n'
 
@@ -37,16 +38,13 @@ def write_material(scene: Scene, files: Files, limits: Limits) -> Exported:
 
 
 def _written(scene: Scene, name: str, own: str, images: Images, losses: Losses) -> str:
-    """One material as the model that loses less."""
+    """One material as the model that has most of its parameters."""
     pointer = f"/materials/{escaped(name)}"
-    material = as_principled(scene.materials[name], pointer, losses)
-    tried = []
-    for model, write in MODELS.items():
-        graph = Graph(images, pointer, Losses())
-        tried.append((model, graph, write(material, graph)))
-    model, graph, inputs = min(tried, key=lambda one: len(one[1].losses))
-    for place, detail in graph.losses:
-        losses.add(place, detail)
+    material, graph = scene.materials[name], Graph(images, pointer, losses)
+    if isinstance(material, OpenpbrMaterial):
+        model, inputs = "open_pbr_surface", open_pbr_surface(material, graph)
+    else:
+        model, inputs = "standard_surface", standard_surface(as_principled(material, pointer, losses), graph)
     if own != name:
         losses.add(pointer, f"names in MaterialX have letters, digits and _ only; it is called {own}")
     lines = [graph.input(each, value, f"NG_{own}") for each, value in inputs.items()]

@@ -19,10 +19,8 @@ from service.assets.scene_import import Imported
 from service.assets.types import AssetLimits
 from service.cli import main
 from service.problems import AssetError, NotProvided
-from service.scene.saved_material import check_saved_material
 from tests import asset_files as make
-from tests.mtlx_files import from_graph, graph, mtlx, node, surface, value, wire
-from tests.obj_files import zipped
+from tests.mtlx_files import from_graph, graph, losses, material, mtlx, node, surface, taken, value, wire
 from tests.serving import Server
 
 pytest.importorskip("MaterialX")
@@ -30,28 +28,8 @@ pytest.importorskip("MaterialX")
 NOISY = np.random.default_rng(5).integers(0, 256, (8, 4, 3)).astype(np.uint8)
 
 
-def taken(store: AssetStore, files: bytes | dict[str, bytes]) -> Imported:
-    info = store.add(files if isinstance(files, bytes) else zipped(files))
-    assert info.kind == "materials"
-    imported = store.materials(info.id)
-    for name, material in imported.document["materials"].items():
-        shown = [each["texture"] for each in material.values() if isinstance(each, dict)]
-        textures = {each: imported.document["textures"][each] for each in shown}
-        check_saved_material({"materials": {name: material}, "textures": textures})
-    return imported
-
-
-def material(imported: Imported) -> dict[str, Any]:
-    (only,) = imported.document["materials"].values()
-    return only
-
-
 def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> np.ndarray:
     return store.image(imported.document["textures"][reference["texture"]]["asset"]).pixels
-
-
-def losses(imported: Imported) -> set[str]:
-    return {warning["pointer"] for warning in imported.warnings}
 
 
 @pytest.mark.parametrize(
@@ -148,11 +126,11 @@ def test_an_image_times_a_constant_stays_as_it_is(store: AssetStore) -> None:
     files = {"a/m.mtlx": mtlx(made, shader), "a/maps/a.png": make.png(NOISY), "a/maps/n.png": make.png(NOISY // 2)}
     imported = taken(store, files)
     assert material(imported) == {
-        "type": "principled",
+        "type": "openpbr",
         "base_color": {"texture": "a", "factor": [0.5, 0.25, 1.0]},
-        "roughness": {"texture": "a 2", "channel": "g", "factor": 0.5},
-        "metallic": {"texture": "a 2", "channel": "b"},
-        "normal_map": {"texture": "n", "scale": 0.75},
+        "specular_roughness": {"texture": "a 2", "channel": "g", "factor": 0.5},
+        "base_metalness": {"texture": "a 2", "channel": "b"},
+        "geometry_normal": {"texture": "n", "scale": 0.75},
     }
     textures = imported.document["textures"]
     # place2d turns clockwise, and takes its offset last.

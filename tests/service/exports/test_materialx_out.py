@@ -36,6 +36,16 @@ GLASS = {
     "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125,
 }  # fmt: skip
 TINTED = {"type": "principled", "base_color": [0.2, 0.1, 0.9], "roughness": 0.2, "transmission": 1.0}
+OPENPBR = {
+    "type": "openpbr", "base_weight": 0.9, "base_color": [0.5, 0.25, 0.75], "base_diffuse_roughness": 0.4,
+    "base_metalness": 0.5, "specular_weight": 1.5, "specular_color": [0.9, 0.8, 0.7], "specular_roughness": 0.3,
+    "specular_roughness_anisotropy": 0.6, "specular_ior": 0.75, "transmission_weight": 0.25,
+    "transmission_color": [0.1, 0.2, 0.3], "coat_weight": 0.5, "coat_color": [0.6, 0.5, 0.4], "coat_roughness": 0.1,
+    "coat_roughness_anisotropy": 0.3, "coat_ior": 1.7, "coat_darkening": 0.75, "fuzz_weight": 0.2,
+    "fuzz_color": [0.3, 0.2, 0.1], "fuzz_roughness": 0.6, "emission_luminance": 500.0,
+    "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8, "geometry_tangent": [0.6, -0.8, 0.0],
+    "geometry_coat_tangent": [-1.0, 0.0, 0.0],
+}  # fmt: skip
 TEXTURES = {
     "coat": {"asset": "", "color_space": "srgb", "wrap": "mirror", "scale": [2.0, -4.0], "rotation": 30.0,
              "offset": [0.25, 0.5]},
@@ -46,6 +56,13 @@ TEXTURED = {
     "roughness": {"texture": "data", "channel": "g", "factor": 0.5}, "metallic": {"texture": "data", "channel": "b"},
     "alpha": {"texture": "data", "channel": "a"}, "normal_map": {"texture": "data", "scale": 0.5},
     "emission": {"texture": "coat", "factor": 3.0},
+}  # fmt: skip
+OPENPBR_TEXTURED = {
+    "type": "openpbr", "base_color": {"texture": "coat", "factor": [0.5, 1.0, 0.25]},
+    "coat_ior": {"texture": "data", "channel": "g", "factor": 2.0},
+    "fuzz_weight": {"texture": "data", "channel": "b"}, "geometry_opacity": {"texture": "data", "channel": "a"},
+    "geometry_coat_normal": {"texture": "data", "scale": 0.5},
+    "emission_luminance": 100.0, "emission_color": {"texture": "coat", "factor": 3.0},
 }  # fmt: skip
 
 
@@ -84,7 +101,7 @@ def same(found: Any, wanted: Any) -> None:
             assert found[name] == (value if isinstance(value, str) else pytest.approx(value, rel=2e-6)), name
 
 
-@pytest.mark.parametrize("material", [FULL, GLASS, TINTED], ids=["all", "glass", "tinted"])
+@pytest.mark.parametrize("material", [FULL, GLASS, TINTED, OPENPBR], ids=["all", "glass", "tinted", "openpbr"])
 def test_a_material_is_the_same_when_it_is_read_again(store: AssetStore, material: dict[str, Any]) -> None:
     exported = written(store, {"m": material})
     assert not list(exported.losses)
@@ -93,14 +110,15 @@ def test_a_material_is_the_same_when_it_is_read_again(store: AssetStore, materia
     assert not file.warnings
 
 
-def test_textures_keep_their_bytes_and_where_they_lie(store: AssetStore) -> None:
-    exported = written(store, {"m": TEXTURED}, TEXTURES)
+@pytest.mark.parametrize("material", [TEXTURED, OPENPBR_TEXTURED], ids=["principled", "openpbr"])
+def test_textures_keep_their_bytes_and_where_they_lie(store: AssetStore, material: dict[str, Any]) -> None:
+    exported = written(store, {"m": material}, TEXTURES)
     assert not list(exported.losses) and list(exported.beside.values()) == [IMAGE]
     file = again(exported)
     names = {value["texture"] for value in file.document["materials"]["m"].values() if isinstance(value, dict)}
     by_scale = {len(file.document["textures"][name]): name for name in names}
     renamed = {"data": by_scale[2], "coat": by_scale[6]}
-    wanted = json.loads(json.dumps(TEXTURED))
+    wanted = json.loads(json.dumps(material))
     for value in wanted.values():
         if isinstance(value, dict):
             value["texture"] = renamed[value["texture"]]
@@ -109,9 +127,9 @@ def test_textures_keep_their_bytes_and_where_they_lie(store: AssetStore) -> None
         same(file.document["textures"][renamed[name]], {**texture, "asset": "part:0"})
 
 
-def test_the_model_that_loses_less_is_taken_and_the_rest_is_told(store: AssetStore) -> None:
+def test_each_model_has_its_own_node_and_the_rest_is_told(store: AssetStore) -> None:
     turned = {**FULL, "anisotropic_rotation": 90.0, "subsurface": 0.5}
-    exported = written(store, {"brushed metal": turned, "plain": FULL})
+    exported = written(store, {"brushed metal": turned, "plain": OPENPBR})
     assert b"<standard_surface" in exported.data and b"<open_pbr_surface" in exported.data
     assert {pointer for pointer, _ in exported.losses} == {
         "/materials/brushed metal", "/materials/brushed metal/subsurface",

@@ -1,0 +1,76 @@
+"""MaterialX's OpenPBR and Standard Surface become `openpbr` where that loses less."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from service.assets import AssetStore
+from service.scene.material import OpenpbrMaterial
+from tests.mtlx_files import from_graph, graph, losses, material, mtlx, node, surface, taken, value, wire
+
+pytest.importorskip("MaterialX")
+
+OPEN_PBR: dict[str, Any] = {
+    "base_weight": 0.9, "base_color": [0.5, 0.25, 0.75], "base_diffuse_roughness": 0.4, "base_metalness": 0.5,
+    "specular_weight": 1.5, "specular_color": [0.9, 0.8, 0.7], "specular_roughness": 0.2,
+    "specular_roughness_anisotropy": 0.6, "specular_ior": 0.75, "transmission_weight": 0.25,
+    "transmission_color": [0.1, 0.2, 0.3], "coat_weight": 0.5, "coat_color": [0.6, 0.5, 0.4], "coat_roughness": 0.1,
+    "coat_roughness_anisotropy": 0.3, "coat_ior": 1.7, "coat_darkening": 0.75, "fuzz_weight": 0.2,
+    "fuzz_color": [0.3, 0.2, 0.1], "fuzz_roughness": 0.6, "emission_luminance": 500.0,
+    "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8,
+}  # fmt: skip
+
+
+def test_open_pbr_is_openpbr_without_a_loss(store: AssetStore) -> None:
+    """All that the model has stays as it is, tangents turned about the normal as well; an input that is not there is
+    the model's own default."""
+    about = wire("in", "t", "vector3"), wire("axis", "n", "vector3"), value("amount", -30.0)
+    turned = node("rotate3d", "turned", "vector3", *about)
+    made = graph(node("tangent", "t", "vector3"), node("normal", "n", "vector3"), turned, out="turned vector3")
+    inputs = [value(name, each) for name, each in OPEN_PBR.items()]
+    shader = surface("open_pbr_surface", *inputs, from_graph("geometry_coat_tangent", "out", "vector3"))
+    imported = taken(store, mtlx(made, shader))
+    found = material(imported)
+    assert found.pop("geometry_coat_tangent") == pytest.approx([3**0.5 / 2, 0.5, 0], abs=1e-6)
+    assert found == {"type": "openpbr", **OPEN_PBR} and not imported.warnings
+    plain = OpenpbrMaterial.model_validate(material(taken(store, mtlx(surface("open_pbr_surface")))))
+    assert plain == OpenpbrMaterial(type="openpbr")
+
+
+def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
+    unsupported = [
+        value("subsurface_weight", 0.5), value("subsurface_color", 0, "color3").replace('"0"', '"0, 0, 0"'),
+        value("base_color", [0.8, 0.4, 0.2]), value("transmission_dispersion_scale", 1), value("thin_film_weight", 1),
+        value("geometry_thin_walled", "true", "boolean"), value("geometry_tangent", "1, 0, 0", "vector3"),
+        value("transmission_scatter", [0.1, 0.2, 0.3]),
+    ]  # fmt: skip
+    imported = taken(store, mtlx(surface("open_pbr_surface", *unsupported)))
+    assert material(imported) == {"type": "openpbr", "base_color": pytest.approx([0.4, 0.2, 0.1])}
+    assert losses(imported) == {
+        f"SM/{name}" for name in (
+            "subsurface_weight", "transmission_dispersion_scale", "thin_film_weight", "geometry_thin_walled",
+            "geometry_tangent", "transmission_scatter",
+        )
+    }  # fmt: skip
+
+
+def test_standard_surface_is_the_model_that_loses_less(store: AssetStore) -> None:
+    """A tinted, stretched coat is OpenPBR's; with a body below it `principled` has more."""
+    coat = [
+        value("coat", 1), value("coat_color", [0.9, 0.5, 0.2]), value("coat_IOR", 1.6), value("coat_anisotropy", 0.5),
+        value("coat_rotation", 0.25), value("specular_roughness", 0.3), value("emission", 2), value("metalness", 1),
+    ]  # fmt: skip
+    imported = taken(store, mtlx(surface("standard_surface", *coat)))
+    found = material(imported)
+    # b is 1/2: r^2 sqrt(2 / (1 + b^2)) of OpenPBR is r^2 / sqrt(b) here.
+    assert found.pop("coat_roughness") == pytest.approx(0.1 * (1.25 / (2 * 0.5)) ** 0.25, rel=1e-6)
+    assert found == {
+        "type": "openpbr", "base_metalness": 1.0, "base_color": pytest.approx(0.8),
+        "coat_weight": 1.0, "coat_color": pytest.approx([0.9, 0.5, 0.2]), "coat_roughness_anisotropy": 0.5,
+        "geometry_coat_tangent": [0.0, 1.0, 0.0], "coat_darkening": 0.0, "emission_luminance": 1366.0,
+    }  # fmt: skip
+    assert not imported.warnings
+    body = [value("transmission", 1), value("transmission_depth", 2)]
+    assert material(taken(store, mtlx(surface("standard_surface", *coat, *body))))["type"] == "principled"
