@@ -211,7 +211,8 @@ def _model_flags() -> Iterator[Flag]:
     for model in FLAGGED:
         yield Flag(model.flag, _any_of((model,)), in_general=model.in_general)
         if model.lobes_flag != model.flag:
-            yield Flag(model.lobes_flag, partial(_spreads, model=model), raised_with=(model.flag,))
+            spreads = partial(_spreads, model=model)
+            yield Flag(model.lobes_flag, spreads, raised_with=(model.flag,), in_general=model.in_general)
 
 
 def _flags_of(models: Iterable[Model]) -> tuple[str, ...]:
