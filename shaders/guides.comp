@@ -9,6 +9,7 @@ layout(std430, binding = SLOT_FIRST_HITS) buffer hit_buffer { uvec4 hits[]; };
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
+#include "math/fresnel.glsl"
 #include "shapes/shapes.glsl"
 #include "material/texture.glsl"
 #include "material/height.glsl"
@@ -51,6 +52,9 @@ void main() {
             Material m = material_load(at.material);
 #endif
             vec3 seen = m.base_color;
+#if HAS_CONDUCTOR
+            if (m.conductor_eta.x > 0.0) seen = mix(seen, fresnel_conductor(m.conductor_eta, m.conductor_k, 1.0), m.metallic);
+#endif
 #if HAS_TRANSMISSION
             if (model_transmits(m.model)) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
 #endif

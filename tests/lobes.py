@@ -58,6 +58,9 @@ PRINCIPLED = {
     "frosted": materials(roughness=0.3, **GLASS),
     "rough glass": materials(roughness=0.8, ior=1.8, **GLASS),
     "brushed glass": materials(roughness=0.5, anisotropic=0.8, **GLASS),
+    "gold": materials(
+        model=P, metallic=1, roughness=0.4, conductor_eta=(0.18, 0.42, 1.37), conductor_k=(3.42, 2.35, 1.77),
+    ),
     "all at once": materials(
         model=P, base_color=(0.6, 0.3, 0.2), metallic=0.3, subsurface=0.4, specular=0.8, roughness=0.45,
         specular_tint=0.5, anisotropic=0.6, sheen=0.7, sheen_tint=0.3, clearcoat=0.8, clearcoat_gloss=0.2,

@@ -55,6 +55,11 @@ def openpbr(**members: Any) -> np.ndarray:
     return materials(**{"model": NUMBERS["openpbr"], **defaults, **members})
 
 
+def rare(record: np.ndarray) -> frozenset[str]:
+    """The flags that a material raises for code which kernels have only where a scene needs it."""
+    return frozenset({"HAS_CONDUCTOR"} if (record["conductor_eta"] > 0).any() else ())
+
+
 class Prober:
     """Kernels, buffers and uniforms for probes on the context of a Renderer; see `prober_of`."""
 

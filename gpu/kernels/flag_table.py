@@ -91,7 +91,13 @@ def _any_of(models: Iterable[Model]) -> Asks:
 
 
 def _optional(member: str) -> Asks:
-    return lambda s: bool((of(s.materials, with_optional(member)) & (s.materials[member] > 0)).any())
+    """Whether a material has it above 0: the first channel of one that has several."""
+
+    def asks(s: SceneArrays) -> bool:
+        values = s.materials[member].reshape(len(s.materials), -1)[:, 0]
+        return bool((of(s.materials, with_optional(member)) & (values > 0)).any())
+
+    return asks
 
 
 def _microfacets(s: SceneArrays) -> np.ndarray:
@@ -309,6 +315,13 @@ _ROWS = (
         in_general=False,
     ),
     Flag("HAS_CLEARCOAT", _optional("clearcoat"), raised_with=_flags_of(with_optional("clearcoat"))),
+    Flag(
+        "HAS_CONDUCTOR",
+        _optional("conductor_eta"),
+        evaluated_with=_flags_of(with_optional("conductor_eta")),
+        previewed=_any_of(with_optional("conductor_eta")),
+        in_general=False,
+    ),
     Flag(
         "HAS_AMBIENT",
         lambda s: bool((s.materials["ambient"] > 0).any()),

@@ -84,7 +84,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
-        optional=_LAYERS,
+        optional=(*_LAYERS, "conductor_eta"),
     ),
     Model(
         "openpbr",

@@ -87,7 +87,9 @@ class Material(Record):
     # of openpbr, whose transmission_color is attenuation_color
     coat_color: vec3  # what is left of light that crosses the coat twice, straight
     coat_ior: f32
+    conductor_eta: vec3  # of a metal of `principled`; ABSENT: it has its base_color
     base_weight: f32
+    conductor_k: vec3  # its extinction coefficient
     diffuse_roughness: f32
     coat_darkening: f32
     coat_anisotropy: f32

@@ -98,6 +98,7 @@ SCENES: dict[str, Doc] = {
     **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
        for kind, terms in TERMS.items() for e in terms if PLAIN.get(kind) != e},
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
+    "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
 }  # fmt: skip

@@ -103,6 +103,18 @@ def test_the_database_s_numbers_are_the_presets_numbers() -> None:
     assert presets.get("materials", "physically-based-brick")["base_color"] == [0.262, 0.095, 0.061]
 
 
+def test_the_database_s_metals_have_their_index_and_their_colour() -> None:
+    """Head-on they reflect their colour; the slope towards grazing angles is that of n."""
+    found = {entry["name"]: physically_based.document(entry) for entry in physically_based.database()["materials"]}
+    metals = {name: m for name, m in found.items() if "conductor_eta" in m}
+    assert len(metals) == 31 and "Aluminum (Anodized Red)" not in metals
+    for name, m in metals.items():
+        n, k = np.array(m["conductor_eta"]), np.array(m["conductor_k"])
+        head_on = ((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2)
+        assert head_on == pytest.approx(m["base_color"], abs=1e-3), name
+        assert m["metallic"] == 1
+
+
 METALS = {"gold", "silver", "copper", "aluminium", "brushed-aluminium", "iron", "titanium", "chrome", "nickel",
           "platinum", "brass"}  # fmt: skip
 

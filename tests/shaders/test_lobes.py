@@ -12,7 +12,7 @@ from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from tests import baseline, disney, stats
 from tests.lobes import BLINN_PHONG, LAYERED, METAL_ROUGH, PHONG, PRINCIPLED, ROWS, D, Grid
-from tests.probing import DISNEY_FLAGS, OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
+from tests.probing import DISNEY_FLAGS, OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of, rare
 
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] not in (BLINN_PHONG, PHONG)]
 ANGLES = (0.0, 35.0, 70.0, 87.0)
@@ -36,8 +36,10 @@ def _ask(
 ) -> tuple[np.ndarray, np.ndarray]:
     asks = np.zeros((len(ask) + wo.size // 3, 4), np.float32)
     asks[:, :3] = np.concatenate([ask, wo.reshape(-1, 3)])
-    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row] if row in ROWS else LAYERED[row]}
+    record = ROWS[row] if row in ROWS else LAYERED[row]
+    inputs = {Slot.SUM: asks, Slot.MATERIALS: record}
     flags = FLAGS if row in ROWS else PRINCIPLED_FLAGS if row in PRINCIPLED else OPENPBR_FLAGS
+    flags |= rare(record)
     defines = {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
     f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=wo.size // 3 - 1)

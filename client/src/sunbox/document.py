@@ -618,6 +618,10 @@ class PrincipledMaterial(TypedDict, total=False):
     """How far the sheen reaches from grazing angles inwards; satin is low, wool high. (0 to 1, default 0.5)"""
     clearcoat_roughness: float | ScalarTexture
     """Roughness of the coat, in place of its gloss; 0 is a perfect varnish. (0 to 1)"""
+    conductor_eta: list[float] | float
+    """The metal's index of refraction, per channel, beside its k: in place of the base colour. (1e-30 to 1e+09)"""
+    conductor_k: list[float] | float
+    """The metal's extinction coefficient, per channel, beside its index. (0 to 1e+09)"""
     clearcoat_normal_map: NormalTexture
     """The coat's own; without it the coat is smooth over whatever is under it."""
     emission: list[float] | float | str | ColorTexture

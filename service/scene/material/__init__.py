@@ -3,6 +3,7 @@
 surface         emission, opacity and a normal map, which every material may have
 conversion      a material turned into another model
 peaks           widths of the peaks of facets' distributions
+conductor       the complex index of metals
 parameters      parameters that several models share
 diffuse         the Lambertian model
 disney          the "principled" BRDF of 2012

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
-from service.scene.color import Color
+from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.peaks import same_width
 from service.scene.material.surface import SolidSurface
 from service.scene.numbers import (
-    LARGEST,
     Fraction,
     RefractiveIndex,
-    check_number,
-    is_number,
     rounded,
-    vector,
-    vector_schema,
 )
 from service.scene.texture import REFERENCE_TAG, VALUE_TAG, AnyReflectance, ScalarTexture, form_of
 
@@ -47,29 +41,6 @@ AnyAlpha = Annotated[
     Annotated[Annotated[float, Field(ge=0, le=1e6)], Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)],
     Discriminator(form_of),
 ]
-LEAST_INDEX = 1e-30  # of a conductor: above 0 in single precision, too
-
-
-def _per_channel(low: float) -> Callable[[Any], Color]:
-    """A validator: three numbers, one a channel, or one for all."""
-
-    def validate(value: Any) -> Color:
-        if is_number(value):
-            number = check_number(value, low, LARGEST)
-            return number, number, number
-        return vector(low, LARGEST, "[0.2, 0.9, 1.1]")(value)
-
-    return validate
-
-
-def _per_channel_schema(low: float) -> WithJsonSchema:
-    return WithJsonSchema(
-        {"anyOf": [vector_schema(low, LARGEST), {"type": "number", "minimum": low, "maximum": LARGEST}]}
-    )
-
-
-ConductorIndex = Annotated[Color, PlainValidator(_per_channel(LEAST_INDEX)), _per_channel_schema(LEAST_INDEX)]
-Extinction = Annotated[Color, PlainValidator(_per_channel(0.0)), _per_channel_schema(0.0)]
 
 
 def _inside(value: float, bounds: Range) -> float:
@@ -230,6 +201,13 @@ class MicrofacetMaterial(SolidSurface):
             alpha = same_width(before[name], before["alpha"], before["gamma"], value, gamma)
             material["alpha"] = rounded(_inside(alpha, ALPHA_RANGES[cast(Distribution, value)]), 3)
         return material
+
+    @classmethod
+    def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        """A metal with a complex index is a conductor."""
+        if old.get("metallic") == 1 and {"conductor_eta", "conductor_k"} <= made.keys():
+            made["fresnel"] = "conductor"
+        return set()
 
     @property
     def alpha_range(self) -> Range:

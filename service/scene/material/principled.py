@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from service.scene.base import OMITTABLE, hint
+from pydantic import model_validator
+
+from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.disney import DisneyMaterial
 from service.scene.texture import (
     AnyDegrees,
@@ -132,6 +135,32 @@ class PrincipledMaterial(DisneyMaterial):
             follows=("clearcoat_gloss", roughness_of_gloss),
         ),
     ] = None
+    conductor_eta: Annotated[
+        ConductorIndex | None,
+        OMITTABLE,
+        hint(
+            "Metal's index",
+            "The metal's index of refraction, per channel, beside its k: in place of the base colour.",
+            group="Specular",
+            unit="",
+            widget="number",
+            absent="by base colour",
+            example=[0.18, 0.42, 1.37],
+        ),
+    ] = None
+    conductor_k: Annotated[
+        Extinction | None,
+        OMITTABLE,
+        hint(
+            "Metal's k",
+            "The metal's extinction coefficient, per channel, beside its index.",
+            group="Specular",
+            unit="",
+            widget="number",
+            absent="by base colour",
+            example=[3.42, 2.35, 1.77],
+        ),
+    ] = None
     clearcoat_normal_map: Annotated[
         NormalTexture | None,
         OMITTABLE,
@@ -141,3 +170,21 @@ class PrincipledMaterial(DisneyMaterial):
             group="Coat",
         ),
     ] = None
+
+    @model_validator(mode="after")
+    def _complex_index_is_whole(self) -> PrincipledMaterial:
+        for name, other in (("conductor_eta", "conductor_k"), ("conductor_k", "conductor_eta")):
+            if getattr(self, name) is not None and getattr(self, other) is None:
+                raise refusal(f"{name} needs {other} beside it: the two are the metal's complex index", f"/{name}")
+        return self
+
+    @classmethod
+    def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        """A model whose menu has a conductor becomes a metal; elsewhere its index is of no use."""
+        names = {"conductor_eta", "conductor_k"} & made.keys()
+        if names and old.get("fresnel") == "conductor":
+            made["metallic"] = 1
+            return names | {"fresnel"}
+        for name in names:
+            del made[name]
+        return set()

@@ -44,6 +44,11 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.sheen_roughness = max(m.sheen_roughness, ENERGY_LEAST_SHEEN_ROUGHNESS);
     s.alpha_sheen = s.sheen_roughness * s.sheen_roughness;
 #endif
+#if HAS_CONDUCTOR
+    s.conductor_eta = m.conductor_eta;
+    s.conductor_k = m.conductor_k;
+    s.metal_mean = vec3(0.0); // until principled_face
+#endif
     s.coat_is_delta = false;
 #if HAS_CLEARCOAT
     s.clearcoat = m.clearcoat;
@@ -60,9 +65,30 @@ vec3 principled_tinted(Surface s, float f) {
     return max(vec3(0.0), f - (1.0 - s.specular_color) * (f0 / (1.0 - f0) * (1.0 - f)));
 }
 
-// The metal's reflectance at cosine c, and its cosine-weighted mean.
-vec3 principled_metal(Surface s, float c) { return mix(s.base_color, vec3(1.0), fresnel_schlick(c)); }
-vec3 principled_metal_mean(Surface s) { return s.base_color + (1.0 - s.base_color) / 21.0; }
+// The metal's reflectance at cosine c: that of its indices, or Schlick's.
+vec3 principled_metal(Surface s, float c) {
+#if HAS_CONDUCTOR
+    if (s.conductor_eta.x > 0.0) return fresnel_conductor(s.conductor_eta, s.conductor_k, c);
+#endif
+    return mix(s.base_color, vec3(1.0), fresnel_schlick(c));
+}
+
+// Its cosine-weighted mean.
+vec3 principled_metal_mean(Surface s) {
+#if HAS_CONDUCTOR
+    if (s.conductor_eta.x > 0.0) return s.metal_mean;
+#endif
+    return s.base_color + (1.0 - s.base_color) / 21.0;
+}
+
+#if HAS_CONDUCTOR
+vec3 principled_conductor_mean(Surface s) {
+    vec3 mean = vec3(0.0);
+    for (int i = 0; i < 4; i++)
+        mean += FRESNEL_WEIGHTS[i] * fresnel_conductor(s.conductor_eta, s.conductor_k, FRESNEL_COSINES[i]);
+    return mean;
+}
+#endif
 
 // The chances of picking each lobe; they sum to one.
 struct PrincipledWeights {
@@ -108,6 +134,9 @@ void principled_face(vec3 wo, bool behind, inout Surface s) {
     base_side(behind, s);
     s.albedo = base_albedo(s, wo);
     s.albedo_mean = base_albedo_mean(s);
+#if HAS_CONDUCTOR
+    s.metal_mean = principled_conductor_mean(s);
+#endif
     // The layers lie on the outer side only.
     s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
     s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);

@@ -11,18 +11,6 @@ float fresnel_cook_torrance(float f0, float c) {
     return 0.5 * sqr(difference / sum) * (1.0 + b * b);
 }
 
-// The unpolarised reflectance of a conductor of index eta + i k [Born & Wolf 1999, section 14.2]. a + i b is the
-// normal component of the wave vector inside; a^2 and b^2 each come from the sum that does not cancel.
-float fresnel_conductor(float eta, float k, float c) {
-    float s2 = (1.0 - c) * (1.0 + c), t = (eta - k) * (eta + k) - s2, cross_term = 2.0 * eta * k;
-    float size = 0.5 * (abs(t) + sqrt(t * t + cross_term * cross_term));
-    float other = size > 0.0 ? 0.25 * cross_term * cross_term / size : 0.0;
-    float a2 = t > 0.0 ? size : other, b2 = t > 0.0 ? other : size, a = sqrt(a2);
-    float s = (sqr(a - c) + b2) / (sqr(a + c) + b2);
-    float p = (sqr(a * c - s2) + b2 * c * c) / (sqr(a * c + s2) + b2 * c * c);
-    return 0.5 * s * (1.0 + p);
-}
-
 // The surface's reflectance at cosine c.
 vec3 fresnel_term(Surface s, float c) {
     uint kind = s.terms.fresnel;
