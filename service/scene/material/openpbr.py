@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
 from service.scene.material import openpbr_words
@@ -63,6 +63,8 @@ def _turn(tangent: Vec3) -> float:
 
 class OpenpbrMaterial(AnySurface):
     """OpenPBR Surface 1.1.1: fuzz over a coat over metal, plastic or glass."""
+
+    model_config = ConfigDict(json_schema_extra={"x-name": "OpenPBR"})
 
     type: Literal["openpbr"]
     base_weight: Annotated[
