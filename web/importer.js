@@ -1,5 +1,6 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, several of one set a material, as MaterialX does, glTF, USD and zipped OBJ a scene, JSON what it says.
+// images textures, several of one set a material, as MaterialX does, glTF, USD and zipped OBJ a scene, .cube files the
+// table that the picture's colours go through, JSON what it says.
 
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
@@ -14,11 +15,9 @@ import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
 import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
-import { collected, placed, thingFor } from "./texture-set.js";
-import { zip } from "./lib/zip.js";
 
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
-const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
+const ORDER = ["json", "scene", "mesh", "light", "image", "table"]; // a texture comes after the mesh that it is for
 
 const ACCEPT = accepted(ORDER);
 
@@ -72,6 +71,7 @@ export class Importer {
     if (!files.every((file) => isImage(file) || isMaterialX(file)) || (images < 2 && !described)) return false;
     const name = `${files.length} ${described ? "files" : "images"}`;
     try {
+      const { zip } = await import("./lib/zip.js");
       const archive = await zip(files, name);
       await this.#takeMaterials(await this.upload(archive), archive, at);
       return true;
@@ -108,7 +108,8 @@ export class Importer {
     const info = zipped ?? (await this.upload(file));
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
     if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
-    if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
+    if (kind === "table") this.#putTable(info, file);
+    else if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
     else await this.#takeImage(info, file, at);
     return false;
   }
@@ -126,6 +127,7 @@ export class Importer {
   }
 
   async #takeMaterials({ id }, file, at) {
+    const { collected, placed, thingFor } = await import("./texture-set.js");
     const { warnings, ...set } = await fetchAssetMaterials(id);
     const materials = unpacked(set);
     const thing = await thingFor(at, { controller: this.controller, state: this.acts.state });
@@ -271,6 +273,21 @@ export class Importer {
       ({ widget, takesTexture }) => widget === "color" && takesTexture,
     );
     return field && `${this.acts.materialPlace}/${field.name}`;
+  }
+
+  // A table of colours for the whole picture.
+  async table(file) {
+    try {
+      this.#putTable(await this.upload(file), file);
+    } catch (problem) {
+      this.#refuse(file, problem);
+    }
+    this.messages.hide("upload");
+  }
+
+  #putTable({ id, kind }, file) {
+    if (kind !== "lut") throw new Error("A .cube file is needed here.");
+    this.acts.putTable(id, file.name);
   }
 
   // An image for a parameter.

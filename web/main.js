@@ -212,6 +212,7 @@ const panel = new Panel(find, {
     frame: (thing) => controller.frame(thing),
     duplicate: adder.calls("duplicate"),
     takeTexture: importer.calls("texture"),
+    takeTable: importer.calls("table"),
   },
   paint: (image, material) => thumbnails.own(image, material),
   say,

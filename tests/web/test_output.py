@@ -102,6 +102,10 @@ def test_a_picture_is_rendered_in_any_size_and_saved(editor: Editor) -> None:
     with page.expect_download() as waiting:
         page.get_by_role("menuitem", name="WebP").click()
     assert Image.open(waiting.value.path()).format == "WEBP" and waiting.value.suggested_filename.endswith("-1.webp")
+    item.get_by_role("button", name="More for this render").click()
+    with page.expect_download() as waiting:
+        page.get_by_role("menuitem", name="EXR with mattes").click()
+    assert b"CryptoMaterial00" in waiting.value.path().read_bytes()
     page.get_by_role("tab", name="Renders").click()
     assert renders(editor).count() == page.locator("#renders-sheet .render").count(), "here now, and in one place"
     name, exr = download(editor, renders(editor).first, "Download EXR")
@@ -220,3 +224,24 @@ def test_a_noisy_picture_is_saved_now_or_when_it_is_clean(editor: Editor) -> Non
     with page.expect_download() as waiting:
         asked.get_by_role("button", name="When clean").click()
     assert int(waiting.value.suggested_filename.split("-")[-1].removesuffix(".png")) > 1
+
+
+def test_a_table_of_colours_is_dropped_saved_and_removed(editor: Editor) -> None:
+    page = editor.page
+    before = editor.settled()
+    inverted = "LUT_1D_SIZE 2\n1 1 1\n0 0 0\n"
+    editor.drop("#stage", {"Inverted.cube": inverted.encode()})
+    editor.wait_for_change(before, 40.0)
+    editor.tab("film")
+    chip = page.get_by_role("button", name="Another colour table")
+    assert chip.inner_text() == "Inverted.cube"
+    made = read_metadata(editor.shot("#download"))
+    assert made is not None and made["view"]["lut"].startswith("sha256:")
+    page.get_by_role("button", name="Remove the colour table").click()
+    editor.wait("the picture of before", lambda: not editor.differs(before, 20.0))
+    assert page.evaluate("document.activeElement.ariaLabel") == "Choose a colour table"
+    page.keyboard.press("Control+z")
+    editor.wait("the table again", chip.is_visible)
+    editor.drop("#stage", {"Broken.cube": b"LUT_1D_SIZE 2\n1 1\n"})
+    editor.wait("a word about it", lambda: "Broken.cube was not taken" in page.inner_text("#messages"))
+    assert chip.inner_text() == "Inverted.cube", "the last good one stays"

@@ -5,6 +5,7 @@
 
 import { element } from "../lib/dom.js";
 import { inWords } from "../lib/format-text.js";
+import { equal } from "../lib/patch.js";
 import { recall } from "../lib/browser-storage.js";
 import { visible } from "../document/outline.js";
 import { revived } from "../document/share.js";
@@ -208,9 +209,9 @@ export class Render extends Still {
     this.#painted = painted;
   }
 
-  show({ view: { exposure, tone_map } }) {
-    const view = { exposure, tone_map };
-    if (this.#shown?.exposure === exposure && this.#shown.tone_map === tone_map) return this.settle();
+  show({ view: { exposure, tone_map, lut } }) {
+    const view = { exposure, tone_map, ...(lut && { lut }) };
+    if (equal(this.#shown, view)) return this.settle();
     const isFirst = this.#shown === null;
     this.#shown = view;
     this.#soon(isFirst ? 0 : REST_MS);

@@ -165,6 +165,13 @@ export class Editor extends Store {
     });
   }
 
+  // The table of colours through which the picture goes last, by its asset's id, and the name of its file.
+  putTable(id, file) {
+    const { view, chosen } = this.state;
+    const { lut, ...others } = view;
+    this.change({ view: id ? { ...others, lut: id } : others, chosen: { ...chosen, tableFile: file } });
+  }
+
   // --- materials ---
 
   // Where the material in hand is: in the scene, or variant B.

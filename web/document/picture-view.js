@@ -46,6 +46,7 @@ export function viewOf(ui, view, { isPaused, quality, isExact }) {
   const painted = isPainted(layer);
   return {
     ...view,
+    lut: view.lut ?? null,
     aov: layer,
     bits: 8,
     color_space: isWide && layer === "color" && !isExact ? "display_p3" : "srgb",

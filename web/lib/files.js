@@ -20,11 +20,12 @@ const KINDS = {
   jpg: "image",
   jpeg: "image",
   webp: "image",
+  cube: "table",
   json: "json",
   sunbox: "json",
 };
 
-// What a file is by its ending: scene, mesh, light, image or json; undefined for others.
+// What a file is by its ending: scene, mesh, light, image, table or json; undefined for others.
 export const kindOf = (file) => KINDS[file.name.split(".").at(-1).toLowerCase()];
 
 // The endings of files of these kinds, as a file picker takes them.

@@ -4,6 +4,7 @@
 import { DISPLAY } from "../document/picture-view.js";
 import { showEditing } from "./editing.js";
 import { fillPicker } from "../forms/library.js";
+import { LookTable } from "./look-table.js";
 import { MaterialPanel } from "./material-panel.js";
 import { ThingPart } from "./thing-part.js";
 import { fields, materialModels } from "../server/schema.js";
@@ -20,7 +21,8 @@ export class Panel {
   #forms = {};
   #made = null; // what the material's form was made for
 
-  // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing) and takeTexture(place, file);
+  // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing), takeTexture(place, file) and
+  // takeTable(file);
   // `paint(image, material)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
   // them.
   constructor(find, { schema, library, acts, stage, paint, say, textureActs }) {
@@ -34,6 +36,12 @@ export class Panel {
       view.filter(({ name }) => DISPLAY.includes(name)),
       "/view",
     );
+    this.table = new LookTable({
+      take: this.stage.takeTable,
+      remove: () => acts.putTable(),
+      nameOf: () => acts.state.chosen.tableFile,
+    });
+    find("view-form").append(this.table.element);
     const main = MAIN_SETTINGS.map((name) => settings.find((field) => field.name === name)).filter(Boolean);
     this.#forms.settings = this.#mount("settings", main, "/settings");
     this.#forms.more = this.#mount(
@@ -88,6 +96,7 @@ export class Panel {
     this.materialPanel.show(state);
     this.thingPart.show(state);
     this.#forms.view.show(view);
+    this.table.show(view.lut);
     this.#forms.settings.show(settings, knobs);
     this.#forms.more.show(settings, knobs);
   }

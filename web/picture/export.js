@@ -2,7 +2,6 @@
 
 import { readKey } from "../server/key.js";
 import { renderUrl } from "../server/api.js";
-import { writeExr } from "./exr.js";
 import { KEY, pngWith, recipeText } from "../document/recipe.js";
 
 const CHANNELS = {
@@ -34,6 +33,7 @@ export async function exr(stream, aovs, madeFrom) {
     [header, scene] = [own, shown];
     layers.push({ names: CHANNELS[aov], floats: new Float32Array(bytes) });
   }
+  const { writeExr } = await import("./exr.js"); // few want one
   return {
     blob: await writeExr(layers, header.width, header.height, {
       [KEY]: recipeText(madeFrom(scene, header.samples, { aov: "all" })),
@@ -49,8 +49,8 @@ export function exactSettings({ time_limit, target_noise, ...settings }, samples
   return { ...settings, max_samples: Math.max(1, samples) };
 }
 
-export function curl(scene, settings, { exposure, tone_map }) {
-  const url = renderUrl({ format: "png", exposure, tone_map });
+export function curl(scene, settings, { exposure, tone_map, lut }) {
+  const url = renderUrl({ format: "png", exposure, tone_map, ...(lut && { lut }) });
   const key = readKey() ? ' -H "Authorization: Bearer $SUNBOX_API_KEY"' : "";
   return `curl -s ${quoted(url)}${key} -H 'Content-Type: application/json' -o sunbox.png -d ${quoted(JSON.stringify({ scene, settings }))}`;
 }

@@ -21,10 +21,10 @@ export function pictureRecipes({ schema, acts, info, size, view, viewDefaults })
     },
     reopen({ scene, settings, view: shown = {} }, title) {
       const { width, height, ...knobs } = settings;
-      const { exposure, tone_map } = { ...viewDefaults, ...shown };
+      const { exposure, tone_map, lut = null } = { ...viewDefaults, ...shown };
       acts.openScene(scene, title, undefined, {
         settings: { ...givenOf(knobs, base(settings.quality)), width, height },
-        view: givenOf({ exposure, tone_map }, viewDefaults),
+        view: givenOf({ exposure, tone_map, lut }, viewDefaults),
       });
     },
   };

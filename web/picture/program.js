@@ -19,7 +19,7 @@ function python(value, indent = "") {
   return `${open}\n${parts.map((part) => `${deeper}${part},\n`).join("")}${indent}${close}`;
 }
 
-export function pythonProgram(scene, settings, { exposure, tone_map }) {
+export function pythonProgram(scene, settings, { exposure, tone_map, lut }) {
   const given = Object.entries(settings).map(([name, value]) => `    ${name}=${python(value)},\n`);
   return `# pip install sunbox; a key is read from SUNBOX_API_KEY
 from sunbox import Client
@@ -30,6 +30,6 @@ with Client(${JSON.stringify(serverUrl())}) as client:
     picture = client.render(
         scene,
 ${given.map((line) => `    ${line}`).join("")}    )
-    picture.save("sunbox.png", exposure=${python(exposure)}, tone_map=${python(tone_map)})
+    picture.save("sunbox.png", exposure=${python(exposure)}, tone_map=${python(tone_map)}${lut ? `, lut=${python(lut)}` : ""})
 `;
 }

@@ -11,6 +11,12 @@ export const FORMATS = {
   png: { title: "PNG", query: { format: "png" }, making: "Writing the PNG" },
   "png-16": { title: "PNG, 16 bit", query: { format: "png", bits: 16 }, making: "Writing the PNG", ending: "png" },
   exr: { title: "EXR", query: { format: "exr", aov: "all" }, making: "Tracing the layers of the EXR" },
+  "exr-mattes": {
+    title: "EXR with mattes",
+    query: { format: "exr", aov: "all", cryptomatte: true },
+    making: "Tracing the layers and mattes of the EXR",
+    ending: "exr",
+  },
   webp: { title: "WebP", query: { format: "webp" }, making: "Writing the WebP" },
   avif: { title: "AVIF", query: { format: "avif" }, making: "Writing the AVIF" },
 };
@@ -21,7 +27,7 @@ const megabytes = (bytes) => `${Math.max(0.1, bytes / 1e6).toFixed(bytes < 1e7 ?
 export class RenderFiles {
   #making = new Map(); // by "id format": what is said of it
 
-  // `view(render)`: the exposure and the tone map it is displayed with; `changed(id)` when something else is to be said
+  // `view(render)`: the exposure, the tone map and the table it is displayed with; `changed(id)` when something else is to be said
   // of that render; `complain(problem)`, `say(text)`.
   constructor({ view, changed, complain, say }) {
     Object.assign(this, { view, changed, complain, say });

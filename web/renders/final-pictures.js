@@ -11,7 +11,7 @@ import { openRender } from "./viewer.js";
 import { RenderViews } from "./views.js";
 import { titleOf } from "./words.js";
 
-const FURTHER = ["png-16", "webp", "avif"]; // formats beside PNG and EXR, which have buttons of their own
+const FURTHER = ["png-16", "exr-mattes", "webp", "avif"]; // formats beside PNG and EXR, which have buttons of their own
 const SPECIAL = ["avif"]; // of these the ones that not every server writes
 const LONGEST_LABEL = 200;
 
