@@ -59,13 +59,15 @@ float direct_found_weight(Path path) {
 
 // Whether the light is visible; surfaces on the way that let a share of it through take the rest from c.
 bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
-    uvec2 skip = uvec2(at.flat_id, light.id);
-    vec3 o = shapes_leave(at, light.wi);
+    uvec2 skip = uvec2(terminator_skip(at, light.wi), light.id);
+    vec3 o, d;
+    float t;
+    terminator_aim(at, light, o, d, t);
 #if HAS_OPACITY
-    c *= transparency_share(o, light.wi, light.t, skip);
+    c *= transparency_share(o, d, t, skip);
     return budget_lasts();
 #else
-    return !shapes_occluded(o, light.wi, light.t, skip) && budget_lasts();
+    return !shapes_occluded(o, d, t, skip) && budget_lasts();
 #endif
 }
 
@@ -76,7 +78,7 @@ void direct_add(Surface s, Interaction here, LightContext context, float share, 
     LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
     Scatter f = bsdf_eval_world(s, here, light.wi);
     float across = dot(light.wi, here.front), side = dot(light.wi, here.facing);
-    bool counts = direct_counts(light, path.hit.id) && (here.mapped || sides_agrees(side, across))
+    bool counts = direct_counts(light, path.hit.id) && (here.mapped || terminator_agrees(path.at, light.wi, side, across))
         && max_component(f.f * light.radiance) > 0.0;
     float weight = direct_weight(light, share * f.pdf);
     if (counts) {

@@ -3,6 +3,7 @@ struct Interaction {
     vec3 wo;       // in the shading frame
     bool behind;   // it is seen from the inner side of the geometry
     vec3 front;    // the geometric normal on the viewer's side
+    vec3 fold;     // the normal of the plane about which lobes of bent normals are folded
     vec3 facing;   // the normal that decides on which side of the surface a direction is
     Basis basis;   // the shading frame
     vec2 tangent;  // the direction in it that anisotropy stretches along
@@ -56,6 +57,7 @@ Interaction interaction_make(inout Path path, out Material m) {
 #else
     m = material_pick(path.at.material);
 #endif
+    vec3 smooth_w = sides_normal(path.at, wo_w);
 #if HAS_HEIGHTS
     here.mapped = height_normal(path.at, path.at.ns); // that of the surface on which coat and base lie
 #endif
@@ -76,10 +78,13 @@ Interaction interaction_make(inout Path path, out Material m) {
 #endif
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
-    here.facing = here.mapped ? here.front : here.basis.z; // a folded lobe reaches all directions in front
     here.transmits = material_transmits(m);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
+    here.fold = here.front;
+    bool lifts = terminator_begin(here.front, here.behind, here.transmits || medium_around(path.medium), path.at);
+    if (lifts) here.fold = smooth_w;
+    here.facing = here.mapped ? here.fold : here.basis.z; // a folded lobe reaches all directions in front
     return here;
 }
 

@@ -18,6 +18,15 @@ vec3 medium_share(Medium m, float t) {
 #endif
 }
 
+// Whether the ray is inside a body.
+bool medium_around(Medium m) {
+#if HAS_ATTENUATION
+    return m.depth > 0.5;
+#else
+    return false;
+#endif
+}
+
 #if HAS_ATTENUATION
 const float MEDIUM_WALL = 1e20; // 1/m; a rate above absorbs all light and would round away the others in a sum
 const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below passes at most

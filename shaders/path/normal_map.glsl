@@ -8,7 +8,7 @@
 // The folded BSDF towards v, in world space.
 Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
     Scatter sum = Scatter(vec3(0.0), 0.0);
-    float side = dot(v, here.front);
+    float side = dot(v, here.fold);
     vec3 w = v;
     bool more;
     uint k = 0u;
@@ -16,7 +16,7 @@ Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
         vec3 wi = basis_to_local(here.basis, w);
         Scatter f = bsdf_eval(s, here.wo, wi);
         if (!here.mapped || wi.z * side > 0.0) sum = Scatter(sum.f + f.f, sum.pdf + f.pdf);
-        w = v - 2.0 * side * here.front;
+        w = v - 2.0 * side * here.fold;
         more = k == 0u && here.mapped && dot(w, here.basis.z) * side > 0.0;
 #if HAS_COAT_NORMALS
         Scatter c = models_coat_eval(s, here.wo, wi);
@@ -45,9 +45,9 @@ vec3 normal_map_direction(Interaction here, LobeSample lobe) {
     vec3 d = basis_to_world(here.basis, lobe.wi);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
     // Uniform directions are drawn about the surface itself, where nothing needs folding.
-    if (here.mapped && !lobe.is_delta) d = basis_to_world(basis_make(here.front), lobe.wi);
+    if (here.mapped && !lobe.is_delta) d = basis_to_world(basis_make(here.fold), lobe.wi);
 #endif
-    float across = dot(d, here.front);
-    if (here.mapped && across * (lobe.coated ? 1.0 : lobe.wi.z) < 0.0) d -= 2.0 * across * here.front;
+    float across = dot(d, here.fold);
+    if (here.mapped && across * (lobe.coated ? 1.0 : lobe.wi.z) < 0.0) d -= 2.0 * across * here.fold;
     return d;
 }

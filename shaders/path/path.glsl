@@ -8,6 +8,7 @@
 #include "path/cone.glsl"
 #include "path/found_light.glsl"
 #include "path/sides.glsl"
+#include "path/terminator.glsl"
 #include "path/path_extend.glsl"
 #include "path/interaction.glsl"
 #include "path/normal_map.glsl"
@@ -60,7 +61,7 @@ vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
             path.lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);
             direct_lighting(s, here, path.lit, share, rng, path);
-            BsdfSample next = bsdf_sample_world(s, here, rng, path.bounce);
+            BsdfSample next = bsdf_sample_world(s, here, path.at, rng, path.bounce);
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);

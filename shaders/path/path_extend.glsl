@@ -69,7 +69,8 @@ void path_widen(BsdfSample next, Surface s, inout Path path) {
 void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
     path.alive = next.valid;
     path_widen(next, s, path);
-    path.o = shapes_leave(path.at, next.d);
+    path.o = terminator_leave(path.at, next.d);
+    path.at.flat_id = terminator_skip(path.at, next.d);
     path.d = next.d;
     path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;
     path.counts = ESTIMATOR != ESTIMATOR_LIGHT || next.is_delta;

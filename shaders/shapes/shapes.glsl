@@ -12,6 +12,10 @@ struct SurfacePoint {
     uint light;   // the index of the light that it belongs to, or NONE
     uint flat_id; // the shape's id, if a ray that leaves the shape cannot meet it again; else NONE
     uint shape;   // its index in the scene document, with the bits SINGLE_SIDED and HIDDEN
+#if HAS_SMOOTH_NORMALS
+    vec3 lift;    // from the triangle to the smooth surface above it, on the outer side (path/terminator.glsl)
+    vec3 sink;    // likewise on the inner side
+#endif
 #if HAS_TEXTURES || HAS_ANISOTROPIC
     float handed; // -1 where v grows against cross(ns, tangent)
 #endif
@@ -37,6 +41,9 @@ struct SurfacePoint {
 
 // What holds where a shape's own function does not say otherwise.
 void shapes_plain(inout SurfacePoint r) {
+#if HAS_SMOOTH_NORMALS
+    r.lift = r.sink = vec3(0.0);
+#endif
 #if ANY_FOOTPRINTS
     r.grow_u = r.grow_v = vec3(0.0);
     r.bend = 0.0;

@@ -163,6 +163,16 @@ vec3 triangle_tangent(uint normal, uint bits, uint k) {
 }
 #endif
 
+#if HAS_SMOOTH_NORMALS
+// Adds what a corner with the weight b and the normal n says of the smooth surface, as seen from the corner to the point
+// `to`: the point's distance from the plane through the corner, on whichever side that plane lies [Hanika 2021].
+void triangle_lift(float b, vec3 to, vec3 n, inout SurfacePoint r) {
+    float above = dot(to, n);
+    r.lift -= b * min(above, 0.0) * n;
+    r.sink -= b * max(above, 0.0) * n;
+}
+#endif
+
 #if HAS_INSTANCES
 SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id, Instance it) {
     SurfacePoint r;
@@ -216,7 +226,12 @@ SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     vec3 n0 = triangle_decode(n.n0), n1 = triangle_decode(n.n1), n2 = triangle_decode(n.n2);
 #endif
     vec3 ns = b0 * n0 + uv.x * n1 + uv.y * n2;
-    if ((n.bits & NORMALS_SMOOTH) != 0u && dot(ns, ns) > 0.0) r.ns = normalize(ns);
+    if ((n.bits & NORMALS_SMOOTH) != 0u && dot(ns, ns) > 0.0) {
+        r.ns = normalize(ns);
+        triangle_lift(b0, uv.x * e1 + uv.y * e2, n0, r);
+        triangle_lift(uv.x, uv.y * e2 - (1.0 - uv.x) * e1, n1, r);
+        triangle_lift(uv.y, uv.x * e1 - (1.0 - uv.y) * e2, n2, r);
+    }
 #if ANY_FOOTPRINTS
     // The mean of what the normals turn along two edges, over their lengths.
     float turned = dot(n1 - n0, e1) / dot(e1, e1) + dot(n2 - n0, e2) / dot(e2, e2);
