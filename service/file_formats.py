@@ -9,7 +9,13 @@ from service.exports import FORMATS
 from service.images import animation
 from service.views import FileFormat
 
-READ = {"meshes": "mesh", "scenes": "scene", "images": "image", "luts": "lut"}  # names of lists, by the kind of asset
+READ = {
+    "meshes": "mesh",
+    "scenes": "scene",
+    "images": "image",
+    "luts": "lut",
+    "measured": "measured",
+}  # names of lists, by the kind of asset
 
 
 def told() -> dict[str, Any]:

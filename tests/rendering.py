@@ -26,6 +26,9 @@ class Images:
     def mesh(self, ref: str) -> Any:
         raise KeyError(ref)
 
+    def measured(self, ref: str) -> Any:
+        raise KeyError(ref)
+
 
 def document(shapes: list[dict[str, Any]], materials: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
     """A scene seen from +Z towards the origin, unless told otherwise."""

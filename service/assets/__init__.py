@@ -1,6 +1,6 @@
 """Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path.
 
-types         meshes, images, scene files, limits, and the protocol by which packing loads assets
+types         meshes, images, measured reflection, scene files, limits, and the protocol by which packing loads assets
 errors        ParseError, which readers raise
 formats       the formats, and how a file's format is recognised
 limits        the bounds on assets, as the configuration sets them
@@ -22,14 +22,24 @@ obj           the importer of OBJ files with materials and textures
 usd           the importer of USD
 texture_sets  the importer of images that make materials by their names
 materialx     the importer of MaterialX
+measured      the readers of measured reflection
 scenes        parts that the importers of whole scenes share
 """
 
 from service.assets.local_files import FileAssets
 from service.assets.store import AssetStore
-from service.assets.types import AssetInfo, AssetLimits, Assets, ImageData, LutData, MeshData, MeshOddities
+from service.assets.types import (
+    AssetInfo,
+    AssetLimits,
+    Assets,
+    ImageData,
+    LutData,
+    MeasuredData,
+    MeshData,
+    MeshOddities,
+)
 
 __all__ = [
-    "AssetInfo", "AssetLimits", "AssetStore", "Assets", "FileAssets", "ImageData", "LutData", "MeshData",
-    "MeshOddities",
+    "AssetInfo", "AssetLimits", "AssetStore", "Assets", "FileAssets", "ImageData", "LutData", "MeasuredData",
+    "MeshData", "MeshOddities",
 ]  # fmt: skip

@@ -10,11 +10,16 @@ import numpy as np
 
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.sandbox import Sandbox
-from service.assets.types import AssetLimits, Assets, ImageData, LutData, MeshData
+from service.assets.types import AssetLimits, Assets, ImageData, LutData, MeasuredData, MeshData
 from service.problems import AssetError, NotProvided
 
-Parsed = MeshData | ImageData | LutData
-NOUNS = {MeshData: "a mesh", ImageData: "an image", LutData: "a table of colours"}
+Parsed = MeshData | ImageData | LutData | MeasuredData
+NOUNS = {
+    MeshData: "a mesh",
+    ImageData: "an image",
+    LutData: "a table of colours",
+    MeasuredData: "measured reflection",
+}
 
 
 class ParsedCache:
@@ -97,6 +102,12 @@ def as_mesh(parsed: Parsed, name: str) -> MeshData:
 def as_image(parsed: Parsed, name: str) -> ImageData:
     if not isinstance(parsed, ImageData):
         raise AssetError(f"{name} is {NOUNS[type(parsed)]}; an image is needed here")
+    return parsed
+
+
+def as_measured(parsed: Parsed, name: str) -> MeasuredData:
+    if not isinstance(parsed, MeasuredData):
+        raise AssetError(f"{name} is {NOUNS[type(parsed)]}; measured reflection (.binary, .bsdf) is needed here")
     return parsed
 
 

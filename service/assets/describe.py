@@ -2,7 +2,7 @@
 
 from service.assets.cache import Parsed
 from service.assets.formats import KINDS
-from service.assets.types import AssetInfo, ImageData, LutData
+from service.assets.types import AssetInfo, ImageData, LutData, MeasuredData
 
 
 def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
@@ -10,8 +10,8 @@ def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
     if isinstance(parsed, ImageData):
         height, width, channels = parsed.pixels.shape
         return AssetInfo(id, KINDS[format], format, size, width, height, channels, warnings=warnings)
-    if isinstance(parsed, LutData):
-        return AssetInfo(id, KINDS[format], format, size)
+    if isinstance(parsed, LutData | MeasuredData):
+        return AssetInfo(id, KINDS[format], format, size, warnings=warnings)
     bounds = [corner.tolist() for corner in parsed.bounds]
     vertices, triangles = len(parsed.vertices), len(parsed.faces)
     return AssetInfo(

@@ -1,6 +1,7 @@
 """The format of some bytes: by the bytes themselves, else by the content type and the name that were sent."""
 
 import re
+import struct
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from functools import cache
 from importlib.util import find_spec
@@ -33,6 +34,8 @@ KINDS: dict[str, Kind] = {
     "jpeg": "image",
     "webp": "image",
     "cube": "lut",
+    "binary": "measured",  # of the MERL database
+    "bsdf": "measured",  # of the RGL database
 }
 
 CRATE, USD_TEXT = b"PXR-USDC", b"#usda"
@@ -50,6 +53,8 @@ MAGIC = (
     (USD_TEXT, "usd"),
     (b"ply\n", "ply"),
     (b"ply\r", "ply"),
+    (b"tensor_file\0", "bsdf"),
+    (struct.pack("<3i", 90, 90, 180), "binary"),
 )
 
 CONTENT_TYPES = {

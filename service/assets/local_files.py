@@ -7,11 +7,11 @@ import stat
 from pathlib import Path
 from types import TracebackType
 
-from service.assets.cache import Parsed, ParsedCache, as_image, as_lut, as_mesh, refused
+from service.assets.cache import Parsed, ParsedCache, as_image, as_lut, as_measured, as_mesh, refused
 from service.assets.errors import ParseError
 from service.assets.source import format_of
 from service.assets.store import AssetStore
-from service.assets.types import AssetLimits, ImageData, LutData, MeshData
+from service.assets.types import AssetLimits, ImageData, LutData, MeasuredData, MeshData
 from service.problems import AssetError, NotFound
 
 
@@ -37,6 +37,12 @@ class FileAssets:
         if ref.startswith("sha256:"):
             return self._store(ref).image(ref)
         return as_image(self._load(ref), repr(ref))
+
+    def measured(self, ref: str) -> MeasuredData:
+        """Raises AssetError."""
+        if ref.startswith("sha256:"):
+            return self._store(ref).measured(ref)
+        return as_measured(self._load(ref), repr(ref))
 
     def lut(self, ref: str) -> LutData:
         """Raises AssetError."""

@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from service.assets.cache import Parsed, ParsedCache, as_image, as_mesh, refused
+from service.assets.cache import Parsed, ParsedCache, as_image, as_measured, as_mesh, refused
 from service.assets.describe import describe
 from service.assets.errors import ParseError
 from service.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
@@ -21,7 +21,7 @@ from service.assets.limits import HasLimits, asset_limits
 from service.assets.scene_import import Imported, take_apart
 from service.assets.scenes.plain_mesh import plain_scene
 from service.assets.source import Source, digest, for_sandbox, format_of, length
-from service.assets.types import AssetInfo, ImageData, Kind, MeshData, SceneFile, ScenePart
+from service.assets.types import AssetInfo, ImageData, Kind, MeasuredData, MeshData, SceneFile, ScenePart
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from service.system.confined import Rights
 from service.system.disk_usage import Usage, expected
@@ -33,12 +33,14 @@ ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
     "make materials by their names; USD; MaterialX; "
-    "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours"
+    "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours; measured "
+    "reflection as MERL .binary and RGL .bsdf files"
 )
 NO_SCENES: dict[Kind, str] = {
     "image": "is an image",
     "materials": "holds materials",
     "lut": "is a table of colours",
+    "measured": "is measured reflection",
 }
 TAKEN_APART: tuple[Kind, ...] = ("scene", "materials")  # kinds of files whose parts are assets of their own
 RECORD_BYTES = 512  # about the size of an asset's record
@@ -92,7 +94,11 @@ class AssetStore:
         """
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
-        if known is not None and self._is_whole(known):
+        if (
+            known is not None
+            and self._is_sound(id, again=True)
+            and (known.kind not in TAKEN_APART or self._imported(id, again=True))
+        ):
             return known
         if not size:
             raise AssetError("the asset is empty")
@@ -186,6 +192,10 @@ class AssetStore:
     def image(self, ref: str) -> ImageData:
         """An image by its reference. Raises AssetError."""
         return as_image(self.load(ref), ref)
+
+    def measured(self, ref: str) -> MeasuredData:
+        """Measured reflection by its reference. Raises AssetError."""
+        return as_measured(self.load(ref), ref)
 
     def start(self) -> None:
         """Start a parsing process, without waiting, so that a first file is parsed at once."""
@@ -298,12 +308,6 @@ class AssetStore:
     def _described(self, id: str, format: str, data: Source) -> AssetInfo:
         """The record of a mesh or an image, which stays parsed for its first scene. Raises AssetError."""
         return describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data), ahead=True))
-
-    def _is_whole(self, info: AssetInfo) -> bool:
-        """Whether all that was stored of an asset is intact, with the parts of a scene."""
-        if not self._is_sound(info.id, again=True):
-            return False
-        return info.kind not in TAKEN_APART or self._imported(info.id, again=True) is not None
 
     def _is_sound(self, id: str, again: bool = False) -> bool:
         try:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
-Kind = Literal["mesh", "image", "scene", "materials", "lut"]
+Kind = Literal["mesh", "image", "scene", "materials", "lut", "measured"]
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,35 @@ class LutData:
     low: tuple[float, float, float]  # where the domain begins and ends
     high: tuple[float, float, float]
     warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeasuredData:
+    """Reflection as it was measured, by tables. The arrays are read-only.
+
+    With `facets` they are of an adaptive parameterization [Dupuy & Jakob 2018], else `values` is (90, 90, 180, 3),
+    1/sr, over half and difference angles, as MERL files have it. `density` says how likely directions shall be drawn:
+    with `facets` over the places that `visible` then takes to facets' normals, else over these normals.
+    """
+
+    values: Floats  # with facets: (phi, theta, rows, columns, 3), over those places
+    theta: Floats  # angles of the viewer to the normal, growing
+    phi: Floats  # and about it; one where the surface looks the same from all sides
+    density: Floats  # (phi, theta, rows, columns), not negative
+    limits: Floats  # (angles, 3): factors for each of both directions, 0 to 90 degrees; none: no direction has one
+    albedo: tuple[float, float, float]  # what of light from all sides comes back
+    visible: Floats | None = None  # (phi, theta, rows, columns): the density of the facets that the viewer sees
+    facets: Floats | None = None  # (rows, columns): the density of facets
+    areas: Floats | None = None  # (rows, columns): their area as a direction sees it
+    symmetry: int = 1  # `phi` covers this part of the circle: 1, 2 (a half turn) or 4 (mirrored twice)
+    is_relative: bool = True  # values are to be multiplied by `facets` over 4 `areas`
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def texels(self) -> int:
+        """About how many texels of sixteen bytes the renderer makes of it."""
+        tables = (self.density, self.visible, self.facets, self.areas)
+        return self.values.size // 3 + sum(table.size for table in tables if table is not None)
 
 
 @dataclass(frozen=True)
@@ -177,8 +206,10 @@ class AssetLimits:
 
 
 class Assets(Protocol):
-    """The assets to which a scene's references lead. Both methods raise AssetError, and any thread may call them."""
+    """The assets to which a scene's references lead. Its methods raise AssetError, and any thread may call them."""
 
     def mesh(self, ref: str) -> MeshData: ...
 
     def image(self, ref: str) -> ImageData: ...
+
+    def measured(self, ref: str) -> MeasuredData: ...

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from service import presets
-from service.assets import Assets, AssetStore, FileAssets, ImageData, MeshData
+from service.assets import Assets, AssetStore, FileAssets, ImageData, MeasuredData, MeshData
 from service.config import load_config
 
 Document = dict[str, Any]
@@ -54,6 +54,9 @@ class BenchAssets:
             return standing(_beside(self._mesh_file).mesh(self._mesh_file.name))
         (knot,) = (s for s in presets.get("scenes", "generated-mesh")["shapes"] if s["type"] == "mesh")
         return standing(divided(self._builtin.mesh(knot["asset"])))
+
+    def measured(self, ref: str) -> MeasuredData:
+        return self._builtin.measured(ref)
 
     def image(self, ref: str) -> ImageData:
         if self._environment_file:

@@ -6,7 +6,7 @@ import hashlib
 import logging
 from typing import Any
 
-from service.assets import AssetStore, FileAssets, ImageData, LutData, MeshData
+from service.assets import AssetStore, FileAssets, ImageData, LutData, MeasuredData, MeshData
 from service.problems import AssetError, NotFound, ServiceError
 from service.scene import references
 
@@ -28,6 +28,10 @@ class SourceAssets:
     def image(self, ref: str) -> ImageData:
         """Raises AssetError."""
         return self._found.image(self._where(ref))
+
+    def measured(self, ref: str) -> MeasuredData:
+        """Raises AssetError."""
+        return self._found.measured(self._where(ref))
 
     def read(self, ref: str) -> bytes:
         """The bytes of a file. Raises AssetError."""

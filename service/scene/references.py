@@ -1,4 +1,4 @@
-"""The assets that a scene's document refers to, valid or not."""
+"""The assets that a scene's document, or a saved material's, refers to, valid or not."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
         holders += [(("textures", name), texture) for name, texture in textures.items()]
     if isinstance(shapes := scene.get("shapes"), list):
         holders += [(("shapes", i), shape) for i, shape in enumerate(shapes)]
+    if isinstance(materials := scene.get("materials"), dict):
+        holders += [(("materials", name), material) for name, material in materials.items()]
+    if "type" in scene:  # a material by itself, as users save it
+        holders.append(((), scene))
     for place, holder in holders:
         if not isinstance(holder, dict):
             continue

@@ -6,7 +6,7 @@ import json
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from service.assets import Assets, AssetStore, ImageData, MeshData
+from service.assets import Assets, AssetStore, ImageData, MeasuredData, MeshData
 from service.assets.store import ID, unknown
 from service.problems import AssetError, NotFound
 from service.scene import Scene
@@ -80,6 +80,10 @@ class VisibleFiles:
         self._check(ref)
         return self._assets.image(ref)
 
+    def measured(self, ref: str) -> MeasuredData:
+        self._check(ref)
+        return self._assets.measured(ref)
+
     def read(self, ref: str) -> bytes:
         self._check(ref)
         try:
@@ -101,7 +105,7 @@ class VisibleFiles:
 
 def references(scene: Scene) -> Iterator[str]:
     """The assets of a scene."""
-    for holder in (scene.environment, *scene.textures.values(), *scene.shapes):
+    for holder in (scene.environment, *scene.textures.values(), *scene.materials.values(), *scene.shapes):
         if (ref := getattr(holder, "asset", None)) is not None:
             yield ref
         if (faces := getattr(holder, "assets", None)) is not None:

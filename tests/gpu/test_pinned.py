@@ -22,6 +22,8 @@ class NoAssets:
 
     def image(self, ref: str) -> None: ...
 
+    def measured(self, ref: str) -> None: ...
+
 
 def waves() -> SceneArrays:
     u, v = np.meshgrid(np.linspace(-1, 1, SIDE), np.linspace(-1, 1, SIDE), indexing="ij")

@@ -62,7 +62,12 @@ def _plain(value: Any) -> Any:
 def _places(scene: Scene) -> Iterator[tuple[dict[str, str], str]]:
     """Where a scene names assets: the object and the member's name. What is no asset is the server's to refuse."""
     environment = scene.get("environment")
-    holders = [environment, *_values(scene.get("shapes")), *_values(scene.get("textures"))]
+    holders = [
+        environment,
+        *_values(scene.get("shapes")),
+        *_values(scene.get("textures")),
+        *_values(scene.get("materials")),
+    ]
     for holder in holders:
         if isinstance(holder, dict) and isinstance(holder.get("asset"), str):
             yield holder, "asset"

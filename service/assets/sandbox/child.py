@@ -15,8 +15,18 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import MissingExtra, ParseError
+from service.assets.measured import transfer
 from service.assets.sandbox.wire import Pieces, publish, receive, send
-from service.assets.types import AssetLimits, ImageData, LutData, MeshData, Pose, RenderedPicture, SceneFile
+from service.assets.types import (
+    AssetLimits,
+    ImageData,
+    LutData,
+    MeasuredData,
+    MeshData,
+    Pose,
+    RenderedPicture,
+    SceneFile,
+)
 from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
@@ -72,13 +82,15 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
 
 
-Parsed = MeshData | ImageData | LutData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture
 
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
     from service.assets.gltf.importer import read_scene
+    from service.assets.measured.adaptive import parse_adaptive
+    from service.assets.measured.merl import parse_merl
     from service.assets.readers.cube import parse_cube
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.readers.rendered import parse_rendered
@@ -96,6 +108,10 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
         return parse_cube(os.pread(source, size, 0))
     # The file is in memory already: it is mapped, not copied.
     mapped = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
+    if format == "binary":
+        return parse_merl(mapped)
+    if format == "bsdf":
+        return parse_adaptive(mapped, limits)
     if not whole:
         return parse_mesh(format, mapped, limits)
     if format == "mtlx":
@@ -117,6 +133,9 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
         return {"layers": [parsed.layers]}, facts
     if isinstance(parsed, LutData):
         return {"lut": [parsed.values]}, {"low": parsed.low, "high": parsed.high}
+    if isinstance(parsed, MeasuredData):
+        tables, facts = transfer.sent(parsed)
+        return {name: [table] for name, table in tables.items()}, facts
     if isinstance(parsed, ImageData):
         return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
     arrays: dict[str, Pieces] = {

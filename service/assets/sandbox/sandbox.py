@@ -13,12 +13,14 @@ import numpy as np
 
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.formats import KINDS
+from service.assets.measured import transfer
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
 from service.assets.types import (
     Animation,
     AssetLimits,
     ImageData,
     LutData,
+    MeasuredData,
     MeshData,
     MeshOddities,
     Pose,
@@ -54,7 +56,7 @@ CRASHES = {
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
 
-Parsed = MeshData | ImageData | LutData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture
 
 # The type of each array of a mesh, and the shape of its rows.
 MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
@@ -98,13 +100,13 @@ class Sandbox:
                 _log_rights(self._rights)
             return self._rights
 
-    def parse(self, format: str, source: bytes | int) -> MeshData | ImageData | LutData:
+    def parse(self, format: str, source: bytes | int) -> MeshData | ImageData | LutData | MeasuredData:
         """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh.
 
         Raises ParseError.
         """
         parsed = self._bounded(format, source, False)
-        assert isinstance(parsed, MeshData | ImageData | LutData)
+        assert isinstance(parsed, MeshData | ImageData | LutData | MeasuredData)
         return parsed
 
     def parse_scene(self, format: str, source: bytes | int, pose: Pose | None = None) -> SceneFile:
@@ -215,6 +217,8 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
     if "lut" in arrays:
         return lut_of(arrays["lut"], reply["low"], reply["high"])
+    if "density" in arrays:
+        return transfer.received(arrays, reply)
     if "layers" in arrays:
         estimator, sampler, depth = reply["ways"]
         return RenderedPicture(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from service import presets
-from service.assets import ImageData, MeshData
+from service.assets import ImageData, MeasuredData, MeshData
 from service.bench.scenes import BenchAssets
 from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
 from service.pack import CUBE_FACES, pack
@@ -32,6 +32,9 @@ class CubeAssets:
 
     def mesh(self, ref: str) -> MeshData:
         raise KeyError(ref)  # the scene has none
+
+    def measured(self, ref: str) -> MeasuredData:
+        raise KeyError(ref)
 
     def image(self, ref: str) -> ImageData:
         ahead, right, down = CUBE_FACES[ref]

@@ -38,6 +38,9 @@ class One:
     def image(self, ref: str) -> Any:
         raise AssertionError(ref)
 
+    def measured(self, ref: str) -> Any:
+        raise AssertionError(ref)
+
 
 def ridge(mesh: MeshData, **shape: Any) -> np.ndarray | None:
     """(2, 3): the packed normals of the two slopes at the ridge; None where there are facets only."""
