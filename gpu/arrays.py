@@ -94,6 +94,10 @@ class SceneArrays:
     microfacets: np.ndarray = field(
         default_factory=lambda: np.zeros((0, 4), np.uint32)
     )  # as layout.microfacet_records says; none without such a material
+    measured: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 4), np.uint32)
+    )  # as layout.measured_records says; none without such a material
+    measured_key: str = ""  # equal where these are
     triangle_normals: np.ndarray = field(default_factory=lambda: _empty(layout.TriangleNormals))  # none: all flat
     tangents: bool = False  # whether these have tangents, of meshes whose materials run along them
     triangle_uvs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # none, or all

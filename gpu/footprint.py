@@ -26,6 +26,8 @@ def unshared_bytes(scene: SceneArrays) -> int:
         shared += e.texels.nbytes + e.probability.nbytes + e.cells.nbytes
     if scene.textures is not None and scene.textures.key:
         shared += scene.textures.texels.nbytes + scene.textures.floats.nbytes
+    if scene.measured_key:
+        shared += scene.measured.nbytes
     return scene_bytes(scene) - shared
 
 

@@ -82,11 +82,12 @@ class Prober:
         frame: np.ndarray | None = None,
         filter_name: str = "box",
         microfacets: np.ndarray | None = None,
+        measured: np.ndarray | None = None,
         **uniforms: Any,
     ) -> list[np.ndarray]:
         """(count, 4) float32 of each output slot after one run over `count` invocations.
 
-        `microfacets` are the words of `SceneArrays.microfacets`.
+        `microfacets` and `measured` are the words of these members of `SceneArrays`.
         """
         kernel = self._kernels.get(entry, {**features.defines(raised), **(defines or {})})
         made = {slot: self.context.buffer(np.ascontiguousarray(a).tobytes()) for slot, a in (inputs or {}).items()}
@@ -105,12 +106,13 @@ class Prober:
         if features.needs_tables(raised):
             for unit, texture in self._tables.items():
                 texture.use(unit)
-        lab = [] if microfacets is None else [linear_texture(self.context, microfacets, 4, "u4")]
-        for texture in lab:
-            texture.use(bindings.MICROFACETS_TEXTURE)
+        given = {bindings.MICROFACETS_TEXTURE: microfacets, bindings.MEASURED_TEXTURE: measured}
+        lab = {u: linear_texture(self.context, words, 4, "u4") for u, words in given.items() if words is not None}
+        for unit, texture in lab.items():
+            texture.use(unit)
         kernel.run(-(-count // 64))
         results = [np.frombuffer(made[slot].read(), np.float32).reshape(count, 4) for slot in outputs]
-        for buffer in (*made.values(), *blocks, *lab):
+        for buffer in (*made.values(), *blocks, *lab.values()):
             buffer.release()
         return results
 

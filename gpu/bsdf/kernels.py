@@ -46,7 +46,9 @@ def samples() -> Iterator[tuple[SceneArrays, frozenset[str]]]:
     for model in MODELS:
         material = np.zeros(1, layout.Material.dtype)
         material["model"] = model.number
-        terms = model.record.words // 4 if model.record else 0
-        arrays = bare(SceneArrays(NOWHERE, material, microfacets=np.zeros((terms, 4), np.uint32)))
+        arrays = SceneArrays(NOWHERE, material)
+        if model.record:
+            setattr(arrays, model.records, np.zeros((model.record.words // 4, 4), np.uint32))
+        arrays = bare(arrays)
         raised = features.evaluating(arrays)
         yield from ((arrays, flags) for flags in (raised, *features.touched(raised, anywhere=False)))

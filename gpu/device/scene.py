@@ -94,6 +94,7 @@ class Scene:
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
         self._images: Taken[Textures] | None = None
+        self._measured: Taken[Textures] | None = None
         self._lit: Taken[_Environment] | None = None
         self._tables: Taken[Textures] | None = None
         self.bytes = unshared_bytes(arrays)  # on the device, without what other scenes have, too
@@ -125,6 +126,10 @@ class Scene:
     def _upload_details(self) -> None:
         """Make the textures of the images' texels and of the triangles' corners that the scene's kernels read."""
         bound = bound_textures(self.arrays, self._raised)
+        measured = bound.pop(bindings.MEASURED_TEXTURE, None)
+        if measured is not None:
+            make = partial(self._upload_images, {bindings.MEASURED_TEXTURE: measured})
+            self._measured = self._shared.measured.take(self.arrays.measured_key, make)
         for unit, values in bound.items():
             if unit not in IMAGE_UNITS:
                 self._details[unit] = linear_texture(self._context, values, *KINDS[unit])
@@ -133,6 +138,7 @@ class Scene:
         self._images = self._shared.images.take(key, partial(self._upload_images, images))
         if self._everything:  # its kernels read every unit; another scene's texture may still be bound there
             missing = KINDS.keys() - self._details.keys() - images.keys()
+            missing -= {bindings.MEASURED_TEXTURE} if measured is not None else set()
             self._details |= {unit: placeholder(self._context, unit) for unit in missing}
 
     def _upload_images(self, images: dict[int, np.ndarray]) -> Textures:
@@ -245,7 +251,7 @@ class Scene:
                 buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
         self._environment.cells.bind_to_storage_buffer(int(Slot.ENVIRONMENT_CELLS))
         self._environment.texels.use(bindings.ENVIRONMENT_TEXTURE)
-        shared = [taken.upload for taken in (self._tables, self._images) if taken is not None]
+        shared = [taken.upload for taken in (self._tables, self._images, self._measured) if taken is not None]
         for unit, texture in chain(*(textures.items() for textures in (*shared, self._details))):
             texture.use(unit)
 
@@ -285,6 +291,6 @@ class Scene:
             buffer.release()
         for texture in self._details.values():
             texture.release()
-        for taken in (self._tables, self._images, self._lit):
+        for taken in (self._tables, self._images, self._measured, self._lit):
             if taken is not None:
                 taken.release()

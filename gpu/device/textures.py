@@ -20,6 +20,7 @@ KINDS = {  # channels and dtype, by texture unit
     bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
     bindings.INSTANCES_TEXTURE: (4, "u4"),
     bindings.MICROFACETS_TEXTURE: (4, "u4"),
+    bindings.MEASURED_TEXTURE: (4, "u4"),
     bindings.SPACES_TEXTURE: (4, "u4"),
 }
 IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
@@ -27,7 +28,7 @@ IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
 
 def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
     """The values behind each texture unit that kernels with these flags read, where the scene has any: the triangles'
-    corners, instances, spaces of shapes, parameters and tables of `microfacet`, the lights' tree, images.
+    corners, instances, spaces of shapes, records and tables of models, the lights' tree, images.
 
     KINDS has their formats.
     """
@@ -38,6 +39,7 @@ def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.n
         bindings.COLORS_TEXTURE: colors,
         bindings.INSTANCES_TEXTURE: arrays.instances,
         bindings.MICROFACETS_TEXTURE: arrays.microfacets,
+        bindings.MEASURED_TEXTURE: arrays.measured,
         bindings.SPACES_TEXTURE: arrays.spaces,
     }
     if arrays.textures is not None:

@@ -1,4 +1,5 @@
-"""What several scenes read on the device, uploaded once: images, environments, tables of energy and of displays."""
+"""What several scenes read on the device, uploaded once: images, measurements, environments, tables of energy and of
+displays."""
 
 from __future__ import annotations
 
@@ -108,14 +109,15 @@ class SharedUploads:
     """The uploads that the scenes of one context share."""
 
     images: UploadCache[Textures] = field(default_factory=UploadCache)
+    measured: UploadCache[Textures] = field(default_factory=UploadCache)
     environments: UploadCache[Any] = field(default_factory=UploadCache)
     tables: UploadCache[Textures] = field(default_factory=UploadCache)
     looks: UploadCache[Buffer] = field(default_factory=UploadCache)
 
     @property
     def bytes(self) -> int:
-        return self.images.bytes + self.environments.bytes + self.tables.bytes + self.looks.bytes
+        return sum(cache.bytes for cache in vars(self).values())
 
     def release(self) -> None:
-        for cache in (self.images, self.environments, self.tables, self.looks):
+        for cache in vars(self).values():
             cache.release()

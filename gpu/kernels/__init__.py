@@ -7,6 +7,7 @@ textures_glsl   how materials read textures, as GLSL
 recipes_glsl    how textures are computed, as GLSL
 words_glsl      records read from words, as GLSL
 instances_glsl  records of instances as GLSL
+measured_glsl  records and tables of the model `measured` as GLSL
 microfacets_glsl  parameters and tables of the model `microfacet` as GLSL
 models_glsl     the functions that pick those of a material's model, as GLSL
 source          shader text with its includes and flags; errors by file and line

@@ -15,7 +15,8 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
 from gpu.layout import LightKind, ShapeKind, microfacet_records, texture_records
-from gpu.layout.models import COATED, DELTA, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
+from gpu.layout.measured_records import MeasuredKind
+from gpu.layout.models import BY_NUMBER, COATED, DELTA, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
 Asks = Callable[[SceneArrays], bool]
 ANYWHERE = ("any scene",)  # in place of the names of flags
@@ -100,16 +101,19 @@ def _optional(member: str) -> Asks:
     return asks
 
 
-def _microfacets(s: SceneArrays) -> np.ndarray:
-    """The records of the materials of that model."""
-    words = s.microfacets.reshape(-1)[: len(s.materials) * microfacet_records.Microfacet.words]
-    records: np.ndarray = np.ascontiguousarray(words).view(microfacet_records.Microfacet.dtype)
-    found: np.ndarray = records[s.materials["model"][: len(records)] == NUMBERS["microfacet"]]
+def _records(s: SceneArrays, model: str) -> np.ndarray:
+    """The records of the materials of a model that has some besides `layout.Material`."""
+    number = NUMBERS[model]
+    row = BY_NUMBER[number]
+    assert row.record is not None
+    words = getattr(s, row.records).reshape(-1)[: len(s.materials) * row.record.words]
+    records: np.ndarray = np.ascontiguousarray(words).view(row.record.dtype)
+    found: np.ndarray = records[s.materials["model"][: len(records)] == number]
     return found
 
 
 def _term(kind: str, value: int) -> Asks:
-    return lambda s: bool((_microfacets(s)[kind] == value).any())
+    return lambda s: bool((_records(s, "microfacet")[kind] == value).any())
 
 
 def _transmits(materials: np.ndarray) -> np.ndarray:
@@ -230,6 +234,15 @@ def _of_microfacet(name: str, asks: Asks) -> Flag:
     return Flag(name, asks, evaluated_with=("HAS_MICROFACET",), in_general=False)
 
 
+def _of_measured(name: str, asks: Asks) -> Flag:
+    """A flag of the model `measured`, likewise."""
+    return Flag(name, asks, evaluated_with=("HAS_MEASURED",), in_general=False)
+
+
+def _measured(kind: MeasuredKind) -> Asks:
+    return lambda s: bool((_records(s, "measured")["kind"] == kind).any())
+
+
 def _of_textures(name: str, asks: Asks, previewed: Asks = Flag.previewed) -> Flag:
     """A flag of textures, which are laid out anew for each scene."""
     return Flag(name, asks, previewed=previewed, in_general=False)
@@ -328,7 +341,10 @@ _ROWS = (
         raised_with=_flags_of(with_optional("ambient")),
     ),
     *_term_flags(),
-    _of_microfacet("HAS_MICROFACET_TABLES", lambda s: bool((_microfacets(s)["rows"] > 0).any())),
+    _of_microfacet("HAS_MICROFACET_TABLES", lambda s: bool((_records(s, "microfacet")["rows"] > 0).any())),
+    _of_measured("HAS_MEASURED_ANGLES", _measured(MeasuredKind.HALF_DIFFERENCE)),
+    _of_measured("HAS_MEASURED_ADAPTIVE", _measured(MeasuredKind.ADAPTIVE)),
+    _of_measured("HAS_MEASURED_LIMITS", lambda s: bool((_records(s, "measured")["limits"] > 0).any())),
     # It adds a fifth to the time of a sample of `principled`.
     Flag(
         "HAS_TRANSMISSION",

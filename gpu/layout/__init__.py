@@ -5,6 +5,7 @@ records          the records of materials, shapes, lights, the tree and the unif
 texture_records  how materials use textures, and which numbers of a material a texture may give
 models           a row for each material model: its number, its lobes, what it can do
 microfacet_records  the terms of the model `microfacet`, their parameters and tables
+measured_records  measured reflection: records and tables of the model `measured`
 links            the bits of links between a tree's nodes, and of what a ray has hit
 bindings         binding points of buffers and blocks, and texture units
 pixel_layers     what a picture stores of every pixel

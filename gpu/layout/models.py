@@ -13,6 +13,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from gpu.layout.measured_records import Measured
 from gpu.layout.microfacet_records import Microfacet
 from gpu.layout.record import Record
 
@@ -47,7 +48,9 @@ class Model:
     has_coat_normals: bool = False  # its coat may have a normal of its own
     has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
     optional: tuple[str, ...] = ()  # members of `layout.Material` that raise a flag where they are above 0
-    record: type[Record] | None = None  # what it has besides `layout.Material`
+    # What it has besides `layout.Material`, and the member of `SceneArrays` that begins with one for each material.
+    record: type[Record] | None = None
+    records: str = ""
     in_general: bool = True  # the kernel for many scenes has it; a rare one would cost all other scenes time
 
     @property
@@ -72,7 +75,26 @@ MODELS = (
     Model("metal_rough", 3, _PLAIN, has_terms=True),
     Model("blinn_phong", 4, _PLAIN, optional=("ambient",)),
     Model("phong", 6, _PLAIN, optional=("ambient",)),
-    Model("microfacet", 5, _PLAIN, has_terms=True, has_members=True, record=Microfacet, in_general=False),
+    Model(
+        "microfacet",
+        5,
+        _PLAIN,
+        has_terms=True,
+        has_members=True,
+        record=Microfacet,
+        records="microfacets",
+        in_general=False,
+    ),
+    Model(
+        "measured",
+        9,
+        (),
+        has_members=True,
+        optional=("anisotropic",),
+        record=Measured,
+        records="measured",
+        in_general=False,
+    ),
     Model(
         "principled",
         2,

@@ -2,6 +2,7 @@
 
 scene               the arrays of a whole scene, from a document and its assets
 parameters          camera, materials, the environment's rotation: their edits need no other module here
+measured            measured reflection, by files
 microfacets         the terms of `microfacet`, and the tables for those that have no closed form
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with their probabilities, and environments with the tables that draw from them

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
-from service.assets import Assets, ImageData, MeshData
+from service.assets import Assets, ImageData, MeasuredData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import assemble
 from service.pack.geometry.geometry import Geometry
@@ -23,6 +23,7 @@ from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
 from service.pack.lights.environment import PackedEnvironment, check_images, environment_key, pack_environment
 from service.pack.lights.light_bounds import Grown, grow_light_tree
+from service.pack.measured import pack_measured
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textured_emission import dark, mean_emission
@@ -87,6 +88,7 @@ def pack(
     Raises InvalidDocument with pointers from the scene's root. Slow with geometry: not for an event loop.
     """
     materials = pack_materials(scene)
+    measured = pack_measured(scene, assets, materials, cache, limits)
     textures, uses, texels, texture_warnings = pack_textures(scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
     emissive[dark(uses, texels)] = False
@@ -102,6 +104,8 @@ def pack(
         camera=pack_camera(scene.camera, built.origin),
         materials=materials,
         microfacets=pack_microfacets(scene),
+        measured=measured.words,
+        measured_key=measured.key,
         lights=picked.records,
         light_tree=picked.tree,
         environment=sky.arrays,
@@ -110,7 +114,9 @@ def pack(
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
     odd = odd_meshes(built.meshes.odd, materials, emissive)
-    return Packed(_with_geometry(arrays, built), [*odd, *built.warnings, *texture_warnings, *sky.warnings])
+    return Packed(
+        _with_geometry(arrays, built), [*odd, *built.warnings, *measured.warnings, *texture_warnings, *sky.warnings]
+    )
 
 
 def _environment(
@@ -190,6 +196,9 @@ class _NoAssets:
         raise AssetError("there are no assets here")
 
     def image(self, ref: str) -> ImageData:
+        raise AssetError("there are no assets here")
+
+    def measured(self, ref: str) -> MeasuredData:
         raise AssetError("there are no assets here")
 
 

@@ -68,6 +68,7 @@ def hint(
     highlight: tuple[Width, str | None] | None = None,
     new: dict[str, str] | None = None,
     known_as: str | None = None,
+    asset: str | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -78,7 +79,7 @@ def hint(
     the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is
     the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
     is what the editor begins an entry of a table with. `known_as` is the name that other models have for the
-    parameter.
+    parameter. `asset` is the kind of the file that a reference leads to, where the editor lets choose one.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -113,6 +114,8 @@ def hint(
         extra["x-new"] = new
     if known_as is not None:
         extra["x-known-as"] = known_as
+    if asset is not None:
+        extra["x-asset"] = asset
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

@@ -55,15 +55,16 @@ def _skeleton(scene: Scene) -> tuple[object, ...]:
     """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
 
     Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
-    which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents. An ambient
-    term counts where it is blinding. Heights that move a mesh decide where its triangles are.
+    which parameter reads which texture, and which file a material has; factors are not. A mesh whose highlight is
+    stretched has tangents. An ambient term counts where it is blinding. Heights that move a mesh decide where its
+    triangles are.
     """
     displaced = {shape.material for shape in _displaced(scene)}
     on_meshes = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape)}
     materials = [
         (
-            name, m.type, m.emission, m.emission_sides, _blinding(m), _looks(m), name in on_meshes and stretches(m),
-            m.height if name in displaced else None,
+            name, m.type, getattr(m, "asset", None), m.emission, m.emission_sides, _blinding(m), _looks(m),
+            name in on_meshes and stretches(m), m.height if name in displaced else None,
         )
         for name, m in scene.materials.items()
     ]  # fmt: skip
@@ -100,4 +101,5 @@ def _files(scene: Scene) -> list[object]:
     e = scene.environment
     faces = list(e.assets) if isinstance(e, CubemapEnvironment) else [getattr(e, "asset", None)]
     images = (getattr(texture, "asset", None) for texture in scene.textures.values())
-    return [*faces, *images, *(getattr(shape, "asset", None) for shape in scene.shapes)]
+    others = (getattr(each, "asset", None) for each in (*scene.shapes, *scene.materials.values()))
+    return [*faces, *images, *others]

@@ -331,6 +331,28 @@ class ImageTexture(TypedDict, total=False):
     """Of a mesh's two sets of coordinates. (0 to 1, default 0)"""
 
 
+class MeasuredMaterial(TypedDict, total=False):
+    """Reflects as a real surface was measured: an uploaded MERL or RGL file has the values, per steradian.  Where the
+    file has more light reflected than arrives, it is scaled down to all of it."""
+
+    type: Required[Literal["measured"]]
+    asset: Required[str]
+    """A MERL .binary or an RGL .bsdf file."""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+    height: HeightTexture
+    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+
+
 class MeshShape(TypedDict, total=False):
     """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
 
@@ -775,6 +797,7 @@ Material = (
     | MetalRoughMaterial
     | BlinnPhongMaterial
     | PhongMaterial
+    | MeasuredMaterial
     | MicrofacetMaterial
 )
 

@@ -13,6 +13,7 @@ openpbr_words   what it and other models say in other words
 metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers
 phong           the first of these highlights
+measured        a real surface, by a file
 microfacet      the distributions, geometry and Fresnel terms of the literature
 """
 
@@ -25,6 +26,7 @@ from pydantic import Field
 from service.scene.material.blinn_phong import BlinnPhongMaterial
 from service.scene.material.diffuse import DiffuseMaterial
 from service.scene.material.disney import DisneyMaterial
+from service.scene.material.measured import MeasuredMaterial
 from service.scene.material.metal_rough import MetalRoughMaterial
 from service.scene.material.microfacet import MicrofacetMaterial
 from service.scene.material.openpbr import OpenpbrMaterial
@@ -41,6 +43,7 @@ Material = Annotated[
     | MetalRoughMaterial
     | BlinnPhongMaterial
     | PhongMaterial
+    | MeasuredMaterial
     | MicrofacetMaterial,
     Field(discriminator="type"),
 ]
@@ -60,6 +63,7 @@ __all__ = [
     "DiffuseMaterial",
     "DisneyMaterial",
     "Material",
+    "MeasuredMaterial",
     "MetalRoughMaterial",
     "MicrofacetMaterial",
     "OpenpbrMaterial",
