@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,8 @@ from service.commands.configuration import configuration
 from service.commands.documents import refusals
 
 if TYPE_CHECKING:
+    from gpu import SceneArrays
+    from service.config import Config
     from service.scene import Material
 
 FORMATS = (".csv", ".svg", ".png")
@@ -39,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     given = [Path(name) for name in (arguments.material, arguments.other) if name is not None]
     materials = [_material(each, arguments.kind) for each in given]
+    packed = [_packed(path, each, config) for path, each in zip(given, materials, strict=True)]
     from gpu import GpuError
     from service.commands.bsdf_curves import curves_of
     from service.worker.in_process import InProcessRenderer
@@ -48,9 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         names = [str(each) for each in given]
     try:
         with InProcessRenderer(config.device) as renderer:
-            curves = [
-                curves_of(renderer, material, arguments.kind, angles, arguments.lobes) for material in materials
-            ]
+            curves = [curves_of(renderer, each, arguments.kind, angles, arguments.lobes) for each in packed]
     except GpuError as error:
         raise Failed(str(error)) from None
     for each, found in zip(given, curves, strict=True):
@@ -80,6 +82,17 @@ def _angle(value: str | float) -> float:
     if not 0 <= angle <= LARGEST_ANGLE:
         raise BadInput(f"--angle {value!r}: must be a number of degrees from 0 to {LARGEST_ANGLE}")
     return angle
+
+
+def _packed(path: Path, material: Material, config: Config) -> SceneArrays:
+    """With the file that it refers to, which stands beside it or was uploaded."""
+    from service.assets import FileAssets
+    from service.pack import pack_material
+    from service.storage.stores import storage
+
+    found = closing(storage(config).assets)
+    with refusals(f"{path}: "), found as store, FileAssets(path.parent, [], store) as assets:
+        return pack_material(material, assets, config)
 
 
 def _material(path: Path, kind: str) -> Material:

@@ -10,10 +10,8 @@ import numpy as np
 
 from gpu import SceneArrays
 from service.colorimetry import LUMINANCE
-from service.pack import pack_material
 
 if TYPE_CHECKING:
-    from service.scene import Material
     from service.worker.in_process import InProcessRenderer
 
 STEP = 0.1  # degrees between two values of a curve
@@ -63,10 +61,9 @@ class Curves:
 
 
 def curves_of(
-    renderer: InProcessRenderer, material: Material, kind: str, angles: list[float], lobes: bool = False
+    renderer: InProcessRenderer, packed: SceneArrays, kind: str, angles: list[float], lobes: bool = False
 ) -> Curves:
     """The curves of one kind; `lobes` is for "polar". Raises GpuError."""
-    packed = pack_material(material)
     return _polar(renderer, packed, angles, lobes) if lobes else KINDS[kind](renderer, packed, angles)
 
 

@@ -22,7 +22,7 @@ from service.pack.microfacets import pack_microfacets
 from service.pack.parameter_edit import parameter_edit
 from service.pack.parameters import pack_camera, pack_materials
 from service.pack.picture_bytes import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES
-from service.pack.scene import Packed, pack, pack_material
+from service.pack.scene import Packed, lone_material, pack, pack_material
 
 __all__ = [
     "CUBE_FACES",
@@ -31,6 +31,7 @@ __all__ = [
     "CacheBudget",
     "PackCache",
     "Packed",
+    "lone_material",
     "pack",
     "pack_camera",
     "pack_material",

@@ -30,7 +30,7 @@ from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.heights import height_fields
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
-from service.problems import AssetError
+from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene import Camera, Material, Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
@@ -79,24 +79,22 @@ class _Lights:
 
 def pack(
     scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None,
-    environments: PackCache | None = None,
+    shared: PackCache | None = None,
 ) -> Packed:  # fmt: skip
     """The renderer's arrays for `scene`.
 
-    `cache` belongs to a document that is being edited. `environments` caches those of other documents, without the
-    results of edits, which are not requested again.
+    `cache` belongs to a document that is being edited. `shared` caches environments and measured reflection
+    of other documents, without the results of edits, which are not requested again.
     Raises InvalidDocument with pointers from the scene's root. Slow with geometry: not for an event loop.
     """
     materials = pack_materials(scene)
-    measured = pack_measured(scene, assets, materials, cache, limits)
+    measured = pack_measured(scene, assets, materials, cache or shared, limits)
     textures, uses, texels, texture_warnings = pack_textures(scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
     emissive[dark(uses, texels)] = False
     built = _geometry(scene, emissive, assets, cache, limits)
     sky = (
-        _Sky()
-        if scene.environment is None
-        else _environment(scene.environment, built.radius, assets, cache, environments)
+        _Sky() if scene.environment is None else _environment(scene.environment, built.radius, assets, cache, shared)
     )
     emission, brightest = mean_emission(materials, uses, texels, built)
     picked = _lights(scene, built, materials, emission, sky.power, cache)
@@ -183,10 +181,22 @@ def _with_geometry(arrays: SceneArrays, built: Geometry) -> SceneArrays:
     )
 
 
-def pack_material(material: Material) -> SceneArrays:
-    """A scene with this material alone, which must not read textures, and without shapes."""
-    scene = Scene(version=1, camera=_NOWHERE, materials={"": material}, shapes=[])
-    return pack(scene, _NoAssets()).arrays
+def lone_material(material: Material) -> Scene:
+    """A scene with this material and nothing else."""
+    return Scene(version=1, camera=_NOWHERE, materials={"": material}, shapes=[])
+
+
+def pack_material(
+    material: Material, assets: Assets | None = None, limits: Limits | None = None, shared: PackCache | None = None
+) -> SceneArrays:
+    """A scene with this material alone, which must not read textures, and without shapes. Raises InvalidDocument with
+    pointers from the material's root, for a file that it refers to."""
+    try:
+        return pack(lone_material(material), assets or _NoAssets(), limits=limits, shared=shared).arrays
+    except InvalidDocument as error:
+        raise InvalidDocument(
+            FieldError(each.pointer.removeprefix("/materials/"), each.detail) for each in error.errors
+        ) from None
 
 
 class _NoAssets:

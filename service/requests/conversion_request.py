@@ -33,10 +33,19 @@ def parse_conversion(body: bytes | bytearray | memoryview) -> Converted:
     for name, value in parsed.choose.items():
         _check_choice(after.name(), name, value)
         material = after.chosen(material, name, value)
+    for name, parameter in parameters(after).items():
+        if parameter.is_required and parameter.file_kind and name not in material:
+            detail = (
+                f"is required: {after.name()} is of a file, the id of an asset of the kind {parameter.file_kind!r}"
+            )
+            raise InvalidDocument([FieldError(f"/choose/{escaped(name)}", detail)])
     return Converted(material, found.lost)
 
 
 def _check_choice(model: str, name: str, value: str) -> None:
+    chosen = parameters(MODELS[model]).get(name)
+    if chosen is not None and chosen.file_kind and value:
+        return
     menus = {each: p.choices for each, p in parameters(MODELS[model]).items() if p.choices is not None}
     if name not in menus:
         detail = f"is no menu of {model}, which has {among(menus)}"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter, Request, Response
 
-from service.ipc.messages import EvaluateBsdf
+from service.ipc.messages import EvaluateBsdf, SceneData
 from service.pack import pack_material
 from service.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfRequest
 from service.requests.parsers import Kind
@@ -77,10 +77,13 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
     async with state.bodies.taken(request) as body:
         await state.renderers.able(STARTING_S)
         asked: BsdfRequest = await state.bodies.parsed(kind, body, caller_of(request))
-    material = pack_material(asked.material)
-    question = EvaluateBsdf(
-        0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner_of(request)
-    )
+    owner = owner_of(request)
+    if getattr(asked.material, "asset", None) is None:
+        material: SceneData = pack_material(asked.material)
+    else:  # a file has to be read
+        reader = state.reader
+        material = await packing(lambda: reader.pack_material(asked.material, owner))
+    question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner)
     answer = asyncio.ensure_future(state.bsdf.ask(question, caller_of(request)))
     if not await until(request, answer):
         return Response(status_code=GONE)

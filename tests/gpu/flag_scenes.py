@@ -2,17 +2,47 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from gpu.layout.microfacet_records import PLAIN, TERMS
+from service.assets import AssetLimits, MeasuredData
+from service.assets.measured.adaptive import parse_adaptive
+from service.assets.measured.merl import parse_merl
+from tests import measured_files
 from tests.extremes.scenes import ball, icosphere, quad
 from tests.rendering import Images, document
 
 Doc = dict[str, Any]
 RNG = np.random.default_rng(4)
-IMAGES = Images(
+
+
+class Shelf(Images):
+    """Images, and measurements."""
+
+    def measured(self, ref: str) -> MeasuredData:
+        return {"merl": _merl, "bright": _bright, "rgl": _rgl}[ref]()
+
+
+@cache
+def _merl() -> MeasuredData:
+    return parse_merl(measured_files.merl(measured_files.Facets()))
+
+
+@cache
+def _bright() -> MeasuredData:
+    return parse_merl(measured_files.merl(measured_files.Facets(diffuse=(1.5, 0.8, 0.1))))
+
+
+@cache
+def _rgl() -> MeasuredData:
+    arrays = measured_files.adaptive(measured_files.Facets(alpha=(0.5, 0.5)), thetas=4, side=8, fine=16)
+    return parse_adaptive(measured_files.tensor_file(arrays), AssetLimits())
+
+
+IMAGES = Shelf(
     bytes=RNG.integers(0, 256, (4, 4, 3)).astype(np.uint8), floats=RNG.random((4, 8, 3)).astype(np.float32),
     face=RNG.random((4, 4, 3)).astype(np.float32),
 )  # fmt: skip
@@ -97,6 +127,10 @@ SCENES: dict[str, Doc] = {
     "MICROFACET": made_of(MICROFACET), "MICROFACET_TABLES": made_of({**MICROFACET, "distribution": "abc"}),
     **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
        for kind, terms in TERMS.items() for e in terms if PLAIN.get(kind) != e},
+    "MEASURED": made_of({"type": "measured", "asset": "merl"}),
+    "MEASURED_ANGLES": made_of({"type": "measured", "asset": "merl"}),
+    "MEASURED_LIMITS": made_of({"type": "measured", "asset": "bright"}),
+    "MEASURED_ADAPTIVE": made_of({"type": "measured", "asset": "rgl"}),
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
     "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),

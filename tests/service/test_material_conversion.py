@@ -35,7 +35,9 @@ EVERY: list[dict[str, Any]] = [
     {"type": "phong", "diffuse": 0.2, "specular": [0.5, 0.4, 0.3], "shininess": 300},
     {"type": "microfacet", "distribution": "phong", "alpha": 1e5, "f0": [1, 0.8, 0.3]},
     {"type": "microfacet", "distribution": "abc", "alpha": 10, "gamma": 900, "diffuse": 0.5, "ior": 2},
+    {"type": "measured", "asset": "sha256:" + "0" * 64, "alpha": 0.5},
 ]
+FILES = {"measured": {"asset": "sha256:" + "0" * 64}}  # what models of a file ask for
 METAL = {"type": "principled", "base_color": [1, 0.8, 0.4], "metallic": 1, "roughness": 0.5}
 FACETS = {"type": "microfacet", "f0": [1, 0.8, 0.4], "alpha": 0.25, "emission": 2}
 
@@ -54,7 +56,7 @@ def converted(material: dict[str, Any], to: str, **choose: str) -> dict[str, Any
 )
 def test_every_model_becomes_every_other_one(old: dict[str, Any], to: str) -> None:
     """The scene takes each of them: `specular` and `alpha` mean something else elsewhere."""
-    made = converted(old, to)
+    made = converted(old, to, **FILES.get(to, {}))
     assert made["type"] == to and parse_scene(
         SCENE
         | {
@@ -75,6 +77,17 @@ def test_colour_and_highlight_stay() -> None:
     blinn, phong = (converted({**METAL, "metallic": 0}, kind) for kind in ("blinn_phong", "phong"))
     assert blinn["shininess"] == 30 and phong["shininess"] == 7.5
     assert blinn["diffuse"] == [1, 0.8, 0.4] and blinn["specular"] == pytest.approx([0.04 * 38 / 8] * 3, rel=1e-3)
+
+
+def test_a_model_of_a_file_asks_for_it() -> None:
+    with pytest.raises(InvalidDocument) as refused:
+        converted(METAL, "measured")
+    (error,) = refused.value.errors
+    assert error.pointer == "/choose/asset" and "'measured'" in error.detail
+    made, lost = asked({**METAL, "emission": 2}, "measured", asset="sha256:" + "1" * 64)
+    assert made == {"type": "measured", "asset": "sha256:" + "1" * 64, "emission": 2}
+    assert lost == ["base_color", "metallic", "roughness"]
+    assert asked(made, "principled")[1] == ["asset"]
 
 
 def test_what_is_lost_is_named() -> None:

@@ -61,6 +61,12 @@ class Parameter:
         return next((option["enum"] for option in self.options if "enum" in option), None)
 
     @property
+    def file_kind(self) -> str | None:
+        """The kind of the file that it refers to, where it refers to one."""
+        found = self.hints.get("x-asset")
+        return None if found is None else str(found)
+
+    @property
     def middle(self) -> float:
         """The middle of its slider."""
         number = next(option for option in self.options if option.get("type") == "number")
@@ -74,7 +80,7 @@ class Parameter:
 
 
 def converted(old: Document, before: type[AnySurface], after: type[AnySurface]) -> Converted:
-    """`old`, a valid document of the model `before`, as one of the model `after`."""
+    """`old`, a valid document of the model `before`, as one of the model `after`, which may want a file still."""
     if before is after:
         return Converted(dict(old), [])
     was, wanted = parameters(before), parameters(after)
@@ -100,7 +106,7 @@ def converted(old: Document, before: type[AnySurface], after: type[AnySurface]) 
         material |= make(old, _highlight(wanted)) | {own: _diffuse(old)}
         used.update(_WIDTHS)
     for name, parameter in wanted.items():  # what this model asks for and the other has not
-        if parameter.is_required and name not in material and parameter.choices is None:
+        if parameter.is_required and name not in material and not parameter.choices and not parameter.file_kind:
             material[name] = parameter.middle
     used |= before.left(old, material) | after.taken(old, material)
     return Converted(material, [name for name in old if name not in used])
