@@ -10,9 +10,9 @@ from typing import Any
 TARGET = Path(__file__).parent / "src" / "sunbox" / "document.py"
 HEAD = '''"""The scene's document as types: dicts whose members an editor and a type checker know.
 
-    from sunbox.document import Camera, DiffuseMaterial, Scene, SphereShape
+    from sunbox.document import DiffuseMaterial, PerspectiveCamera, Scene, SphereShape
 
-    scene: Scene = {"version": 1, "camera": Camera(position=[0, 1, 4], target=[0, 1, 0]), ...}
+    scene: Scene = {"version": 1, "camera": PerspectiveCamera(position=[0, 1, 4], target=[0, 1, 0]), ...}
 
 Written by generate.py from the service's schema; a test holds it to that.
 """

@@ -58,12 +58,18 @@ void main() {
 #else
     uint first = uniforms.sample_first, count = uniforms.sample_count;
 #endif
-    Medium medium = medium_at_camera();
+    Medium medium = medium_at(uniforms.camera.position);
     uint i = 0u, cut = 0u;
     do {
         vec3 o, d;
         Sampler rng = sobol_begin(pixel, first + i, replicate);
         camera_ray(pixel, rng, o, d);
+#if HAS_ORTHOGRAPHIC && HAS_ATTENUATION
+        if (uniforms.camera.kind == CAMERA_ORTHOGRAPHIC) { // its rays begin at many places
+            budget_begin();
+            medium = medium_at(o);
+        }
+#endif
         add(path_radiance(rng, o, d, medium));
         if (path_was_lost) break; // the driver has ended this loop as well
         if (path_was_cut) cut++;

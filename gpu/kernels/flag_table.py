@@ -14,7 +14,7 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
-from gpu.layout import LightKind, ShapeKind, microfacet_records, texture_records
+from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
 from gpu.layout.models import BY_NUMBER, COATED, DELTA, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
@@ -76,6 +76,10 @@ def _tree(kind: ShapeKind) -> Asks:
 
 def _light(kind: LightKind) -> Asks:
     return lambda s: bool((s.lights["kind"] == kind).any())
+
+
+def _camera(kind: CameraKind) -> Asks:
+    return lambda s: bool(s.camera["kind"] == kind)
 
 
 def _sun_disks(s: SceneArrays) -> bool:
@@ -311,6 +315,8 @@ _ROWS = (
     # Without an aperture its code costs less than 2 % of a sample's time (cornell-boxes, sphere-on-floor,
     # point-lights).
     Flag("HAS_APERTURE", lambda s: bool(s.camera["aperture_radius"] > 0), raised_with=ANYWHERE, of_camera=True),
+    Flag("HAS_ORTHOGRAPHIC", _camera(CameraKind.ORTHOGRAPHIC), in_general=False, of_camera=True),
+    Flag("HAS_PANORAMA", _camera(CameraKind.PANORAMA), in_general=False, of_camera=True),
     *_model_flags(),
     Flag("HAS_SUBSURFACE", _optional("subsurface"), raised_with=_flags_of(with_optional("subsurface"))),
     Flag("HAS_SHEEN", _optional("sheen"), raised_with=_flags_of(with_optional("sheen"))),

@@ -6,7 +6,7 @@ from __future__ import annotations
 from gpu import layout
 from gpu.kernels import instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
 from gpu.kernels.words_glsl import unpacked
-from gpu.layout import LightKind, ShapeKind, Uniforms, bindings
+from gpu.layout import CameraKind, LightKind, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.pixel_layers import COVER_RANKS
@@ -103,7 +103,7 @@ def _picker(name: str, record: type[Record]) -> str:
 def constants() -> str:
     """The text of `layout_constants.glsl`, with which that of `layout.glsl` begins."""
     out = []
-    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind)):
+    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("CAMERA", CameraKind)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"const uint MODEL_{model.name.upper()} = {model.number}u;" for model in MODELS]
     out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]

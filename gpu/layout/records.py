@@ -39,6 +39,12 @@ class ShapeKind(IntEnum):
     INSTANCE = 5  # of triangles that have a tree of their own; never in a loop
 
 
+class CameraKind(IntEnum):
+    PERSPECTIVE = 0  # a thin lens
+    ORTHOGRAPHIC = 1
+    PANORAMA = 2
+
+
 class LightKind(IntEnum):
     """Kinds of lights. Those from SPHERE on are shapes, which emit by their material."""
 
@@ -263,15 +269,16 @@ class EnvironmentCell(Record):
 
 
 class Camera(Record):
-    """A thin lens in the scene's (rebased) coordinates; right, up and forward are orthonormal."""
+    """In the scene's (rebased) coordinates; right, up and forward are orthonormal."""
 
     position: vec3
     aperture_radius: f32  # of the lens; 0: a pinhole
     right: vec3
     focus_distance: f32  # along forward
     up: vec3
-    tan_half_vfov: f32  # tangent of half the vertical field of view
+    half_height: f32  # of the picture: a lens's tangent of half the vertical field of view, else m
     forward: vec3
+    kind: u32  # CameraKind
 
 
 class Uniforms(Record):

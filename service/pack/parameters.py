@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from gpu import layout
-from gpu.layout import models
+from gpu.layout import CameraKind, models
 from service.scene import Scene
-from service.scene.camera import Camera
+from service.scene.camera import AnyCamera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
 from service.scene.environment import Environment, SkyEnvironment
 from service.scene.material import Material
 from service.scene.material.surface import SolidSurface
@@ -49,8 +49,14 @@ RENAMED_IN = {
 }
 SIDES = {"front": 1, "both": 2}
 
+CAMERA_KINDS = {
+    PerspectiveCamera: CameraKind.PERSPECTIVE,
+    OrthographicCamera: CameraKind.ORTHOGRAPHIC,
+    PanoramaCamera: CameraKind.PANORAMA,
+}
 
-def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
+
+def pack_camera(camera: AnyCamera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
     """A `layout.Camera`, relative to `SceneArrays.origin`."""
     position, target = np.array(camera.position, np.float64), np.array(camera.target, np.float64)
     view = target - position
@@ -63,9 +69,14 @@ def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
     out["right"] = right
     out["up"] = np.cross(right, forward)
     out["forward"] = forward
-    out["tan_half_vfov"] = math.tan(math.radians(camera.vfov) / 2)
-    out["aperture_radius"] = camera.aperture_radius
-    out["focus_distance"] = distance if camera.focus_distance is None else camera.focus_distance
+    out["focus_distance"] = distance
+    if isinstance(camera, PerspectiveCamera):
+        out["half_height"] = math.tan(math.radians(camera.vfov) / 2)
+        out["aperture_radius"] = camera.aperture_radius
+        out["focus_distance"] = distance if camera.focus_distance is None else camera.focus_distance
+    elif isinstance(camera, OrthographicCamera):
+        out["half_height"] = camera.height / 2
+    out["kind"] = CAMERA_KINDS[type(camera)]
     return out
 
 

@@ -31,12 +31,12 @@ from service.pack.textures.heights import height_fields
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
 from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene import Camera, Material, Scene
+from service.scene import Material, PerspectiveCamera, Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
 from service.scene.shape import MeshShape
 
-_NOWHERE = Camera(position=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0))
+_NOWHERE = PerspectiveCamera(position=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0))
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 
 

@@ -23,7 +23,7 @@ schema          the schema that editors are made from
 
 from __future__ import annotations
 
-from service.scene.camera import Camera
+from service.scene.camera import AnyCamera, Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
 from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
 from service.scene.environment import (
@@ -62,6 +62,7 @@ from service.scene.texture import (
 from service.scene.transform import MatrixTransform, Transform
 
 __all__ = [
+    "AnyCamera",
     "BlinnPhongMaterial",
     "BoxShape",
     "Camera",
@@ -86,6 +87,9 @@ __all__ = [
     "MetalRoughMaterial",
     "NoiseTexture",
     "NormalTexture",
+    "OrthographicCamera",
+    "PanoramaCamera",
+    "PerspectiveCamera",
     "PointLight",
     "PrincipledMaterial",
     "QuadShape",

@@ -15,7 +15,13 @@ struct Cone {
 Cone cone_begin(vec3 d) {
 #if ANY_FOOTPRINTS
     Camera c = uniforms.camera;
-    float pixel = 2.0 * c.tan_half_vfov / float(uniforms.resolution.y);
+    float pixel = 2.0 * c.half_height / float(uniforms.resolution.y);
+#if HAS_ORTHOGRAPHIC
+    if (c.kind == CAMERA_ORTHOGRAPHIC) return Cone(uniforms.footprint_share * pixel, 0.0);
+#endif
+#if HAS_PANORAMA
+    if (c.kind == CAMERA_PANORAMA) return Cone(0.0, uniforms.footprint_share * PI / float(uniforms.resolution.y));
+#endif
     return Cone(0.0, uniforms.footprint_share * pixel * dot(d, c.forward));
 #else
     return Cone(0.0);

@@ -41,12 +41,12 @@ Medium medium_left(Medium m, vec3 rate) {
     return Medium(vec3(0.0), 0.0);
 }
 
-// The medium around the camera: that of the bodies whose surface a straight line leaves more often than it enters.
+// The medium around the place where a camera's ray begins: that of the bodies whose surface a straight line leaves more often than it enters.
 // Opaque shapes do not count. The line goes backwards, where there are fewest surfaces. If it says that the camera is
 // in a body, a second line forwards must agree, as an open sheet is no body.
-Medium medium_at_camera() {
+Medium medium_at(vec3 from) {
     vec3 d = normalize(camera_to_world(MEDIUM_SEARCH));
-    vec3 o = camera_origin();
+    vec3 o = from;
     Medium sum = Medium(vec3(0.0), 0.0), first = sum;
     vec3 walls = vec3(0.0);
     uint skip = NONE, layer = 0u, side = 0u;
@@ -82,7 +82,7 @@ Medium medium_at_camera() {
             more = side == 0u && sum.depth > 0.5 && budget_lasts();
             if (side == 0u) first = sum;
             side++;
-            o = camera_origin();
+            o = from;
             d = -d;
             skip = NONE;
             if (more) {
@@ -95,5 +95,5 @@ Medium medium_at_camera() {
     return Medium(min(first.rate, sum.rate), min(first.depth, sum.depth));
 }
 #else
-Medium medium_at_camera() { return Medium(0.0); }
+Medium medium_at(vec3 from) { return Medium(0.0); }
 #endif

@@ -46,7 +46,7 @@ def sliders(document: Json) -> list[Slider]:
     """The sliders of the camera, the environment, each light and the first material of each kind. A kind is a model,
     and whether it shines: the sliders of others of the same kind do the same."""
     scene = schema()["scene"]
-    found = list(_of(scene, scene["$defs"]["Camera"], document["camera"], ("camera",)))
+    found = list(_of(scene, scene["$defs"]["PerspectiveCamera"], document["camera"], ("camera",)))
     if "environment" in document:
         models = _models(scene, "Environment")
         found += _of(scene, models[document["environment"]["type"]], document["environment"], ("environment",))

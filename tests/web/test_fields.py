@@ -64,3 +64,25 @@ def test_colours_and_lengths_are_taken_as_written(editor: Editor) -> None:
     page.fill(radius, "1/2 + 25 cm")
     page.press(radius, "Enter")
     assert document(editor)["shapes"][0]["radius"] == 0.75
+
+
+def test_a_camera_of_another_type_shows_as_much(editor: Editor) -> None:
+    page = editor.page
+    editor.tab("scene")
+    page.click("#outline-list [data-thing='/camera']")
+    before = editor.settled()
+    page.select_option("#camera-type", "orthographic")
+    editor.wait_for_change(before)
+    made = document(editor)["camera"]
+    assert made["type"] == "orthographic" and made["height"] == pytest.approx(2 * 5.234 * 0.2867, rel=0.01)
+    editor.tab("scene")
+    page.click("#outline-list [data-thing='/camera']")
+    assert page.locator("#thing-form [data-field=height]").is_visible()
+    assert page.locator("#thing-form [data-field=vfov]").count() == 0
+    page.hover("#stage")
+    page.mouse.wheel(0, -200)
+    editor.wait("fewer metres", lambda: document(editor)["camera"]["height"] < made["height"])
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    editor.wait("the lens again", lambda: document(editor)["camera"].get("type", "perspective") == "perspective")
+    assert editor.complaints == []

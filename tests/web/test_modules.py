@@ -309,16 +309,22 @@ def test_floors_and_rooms_are_in_nobodys_way(page: Page) -> None:
     assert call(page, "document/placing.js", "solids", [room, None, floor, crate], [0, 1, 8]) == [crate]
 
 
+LENSES = ({"type": "perspective"}, {"type": "orthographic", "height": 3}, {"type": "panorama"})
+
+
+@pytest.mark.parametrize("lens", LENSES, ids=[lens["type"] for lens in LENSES])
 @pytest.mark.parametrize("position", [[0.0, 1.0, 5.0], [3.0, 4.0, -2.0]])
-def test_a_point_is_seen_where_its_ray_goes(page: Page, position: list[float]) -> None:
-    camera = CAMERA | {"position": position}
+def test_a_point_is_seen_where_its_ray_goes(page: Page, position: list[float], lens: dict[str, Any]) -> None:
+    camera = CAMERA | {"position": position} | lens
     for x, y in [(0.5, 0.5), (0.1, 0.8), (0.9, 0.25)]:
-        direction = call(page, "document/camera.js", "ray", camera, x, y, 1.5)
-        place = np.add(position, np.multiply(direction, 3)).tolist()
+        origin, direction = (call(page, "document/camera.js", part, camera, x, y, 1.5) for part in ("eye", "ray"))
+        place = np.add(origin, np.multiply(direction, 3)).tolist()
         seen = call(page, "document/camera.js", "project", camera, place, 1.5)
         assert (seen["x"], seen["y"]) == pytest.approx((x, y))
         assert seen["z"] > 0
-        assert call(page, "picture/markers.js", "spot", camera, np.add(position, direction).tolist(), 1.5)["isInside"]
+        assert call(page, "picture/markers.js", "spot", camera, np.add(origin, direction).tolist(), 1.5)["isInside"]
+    if lens["type"] != "perspective":
+        return
     behind = np.add(position, np.subtract(position, camera["target"])).tolist()
     above = np.add(behind, [0, 0.5, 0]).tolist()
     mark = call(page, "picture/markers.js", "spot", camera, above, 1.5)

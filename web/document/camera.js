@@ -1,4 +1,5 @@
-// Camera moves: each takes a camera {position, target, up, vfov} and gives the members that change.
+// Camera moves: each takes a camera {type, position, target, up, ...} and gives the members that change. This is the one
+// place that knows how a camera makes a picture.
 
 import { add, cross, dot, length, normalize, scale, subtract, tidy, turn } from "../lib/vector.js";
 
@@ -35,8 +36,18 @@ export function axes({ position, target, up }) {
   return { right, up: cross(right, forward), forward, distance: length(view) };
 }
 
-// Half the height of what the picture shows at a distance from the eye, in metres.
-export const halfHeight = ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2);
+// Half the height of what the picture shows at a distance from the eye, in metres; of a panorama, the arc.
+export function halfHeight({ type, vfov, height }, distance) {
+  if (type === "orthographic") return height / 2;
+  return distance * (type === "panorama" ? Math.PI / 2 : Math.tan(radians(vfov) / 2));
+}
+
+// The camera as one of another type, which shows as much of what it looks at.
+export function turned(camera, type) {
+  const { position, target, up } = camera;
+  const height = Number((2 * halfHeight(camera, axes(camera).distance)).toPrecision(3));
+  return { type, position, target, up, ...(type === "orthographic" ? { height } : {}) };
+}
 
 // Eye and target slide; the plane through the target follows the hand. In heights of the picture.
 export function pan(camera, right, down) {
@@ -55,15 +66,22 @@ export function fly({ position, target, up }, right, rise, forward) {
   return { position: tidy(add(position, shift)), target: tidy(add(target, shift)) };
 }
 
-// The eye comes nearer to the target (factor below 1) or goes away.
-export const zoom = ({ position, target }, factor) => ({
-  position: tidy(add(target, scale(subtract(position, target), factor))),
-});
+// The eye comes nearer to the target (factor below 1) or goes away; of parallel rays fewer are taken, or more.
+export const zoom = ({ type, position, target, height }, factor) =>
+  type === "orthographic"
+    ? { height: Number((height * factor).toPrecision(6)) }
+    : { position: tidy(add(target, scale(subtract(position, target), factor))) };
 
 // From the same side, so far that a ball fills `share` of the picture's shorter side.
 export function frame(camera, { center, radius }, aspect, share = 0.8) {
-  const { position, target } = camera;
-  const half = Math.atan(halfHeight(camera, 1) * Math.min(1, aspect));
+  const { type, position, target } = camera;
+  const narrow = Math.min(1, aspect);
+  if (type === "orthographic") {
+    const back = scale(normalize(subtract(position, target)), Math.max(axes(camera).distance, 2 * radius));
+    const height = Number(((2 * radius) / (share * narrow)).toPrecision(4));
+    return { position: tidy(add(center, back)), target: tidy(center), height };
+  }
+  const half = Math.atan(halfHeight(camera, 1) * narrow);
   const distance = radius / Math.sin(Math.max(half * share, 1e-3));
   const back = normalize(subtract(position, target));
   return { position: tidy(add(center, scale(back, distance))), target: tidy(center) };
@@ -74,6 +92,10 @@ export function frame(camera, { center, radius }, aspect, share = 0.8) {
 export function project(camera, point, aspect) {
   const { right, up, forward } = axes(camera);
   const way = subtract(point, camera.position);
+  if (camera.type === "panorama") {
+    const [x, y, z] = [right, up, forward].map((axis) => dot(way, axis));
+    return { x: 0.5 + Math.atan2(x, z) / (2 * Math.PI), y: Math.atan2(Math.hypot(x, z), y) / Math.PI, z: length(way) };
+  }
   const z = dot(way, forward);
   const tall = halfHeight(camera, z);
   return { x: (dot(way, right) / (tall * aspect) + 1) / 2, y: (1 - dot(way, up) / tall) / 2, z };
@@ -87,9 +109,23 @@ export function isInSight(camera, aspect, { low, high }) {
   });
 }
 
-// The unit direction of the ray through a place in the picture: x to the right and y down, both 0..1.
+// Where the ray through a place in the picture begins: x to the right and y down, both 0..1.
+export function eye(camera, x, y, aspect) {
+  if (camera.type !== "orthographic") return camera.position;
+  const { right, up } = axes(camera);
+  const tall = halfHeight(camera, 1);
+  return add(camera.position, add(scale(right, (2 * x - 1) * tall * aspect), scale(up, (1 - 2 * y) * tall)));
+}
+
+// The unit direction in which it goes.
 export function ray(camera, x, y, aspect) {
   const { right, up, forward } = axes(camera);
+  if (camera.type === "orthographic") return forward;
+  if (camera.type === "panorama") {
+    const [azimuth, polar] = [2 * Math.PI * (x - 0.5), Math.PI * y];
+    const level = add(scale(right, Math.sin(azimuth)), scale(forward, Math.cos(azimuth)));
+    return normalize(add(scale(level, Math.sin(polar)), scale(up, Math.cos(polar))));
+  }
   const tall = halfHeight(camera, 1);
   const across = add(scale(right, (2 * x - 1) * tall * aspect), scale(up, (1 - 2 * y) * tall));
   return normalize(add(forward, across));

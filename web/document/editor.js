@@ -10,7 +10,7 @@ import { exposed } from "./lighting.js";
 import { isFlat } from "./bounds.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { at, pointer, put } from "../lib/patch.js";
-import { blackMaterial, defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
+import { blackMaterial, cameraModels, defaults, environmentModels, fields, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
 import * as variants from "./variants.js";
 import { without } from "./outline.js";
@@ -57,7 +57,8 @@ export class Editor extends Store {
     this.waits = waits;
     this.plainMaterial = newMaterial(schema.scene);
     this.blackMaterial = blackMaterial(schema.scene);
-    this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
+    const cameras = Object.entries(cameraModels(schema.scene));
+    this.#cameraDefaults = Object.fromEntries(cameras.map(([type, own]) => [type, defaults(schema.scene, own)]));
     const move =
       (how) =>
       (...amounts) =>
@@ -79,7 +80,8 @@ export class Editor extends Store {
   }
 
   cameraOf({ camera }) {
-    return { ...this.#cameraDefaults, ...camera };
+    const [usual] = Object.keys(this.#cameraDefaults);
+    return { ...this.#cameraDefaults[camera.type ?? usual], ...camera };
   }
 
   setCamera(members) {
@@ -100,6 +102,11 @@ export class Editor extends Store {
     const wound = (environment.rotation ?? 0) + share * 360;
     const rotation = wound < min ? wound + 360 : wound > max ? wound - 360 : wound;
     this.change(put(this.state, "/scene/environment/rotation", Number(rotation.toFixed(2))), "turn");
+  }
+
+  // From there, by a camera of another type.
+  turnCamera(type) {
+    this.change({ scene: { ...this.state.scene, camera: moving.turned(this.camera, type) } });
   }
 
   resetView() {

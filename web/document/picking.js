@@ -1,7 +1,7 @@
 // What lies under a place in the picture: asked of the renderer's own layers, and kept while the view stays.
 
 import { around, boxAround } from "./bounds.js";
-import { ray } from "./camera.js";
+import { eye, ray } from "./camera.js";
 import { add, scale } from "../lib/vector.js";
 
 const RAW = { format: "rgba32f", quality: null, bits: 8 };
@@ -76,8 +76,8 @@ export class Picker {
         const shape = Math.round(ids.floats[at]) - 1;
         if (shape < 0 || !(depths.floats[at] > 0)) continue;
         if (!clouds.has(shape)) clouds.set(shape, []);
-        const direction = ray(camera, (i + 0.5) / width, (j + 0.5) / height, width / height);
-        clouds.get(shape).push(add(camera.position, scale(direction, depths.floats[at])));
+        const through = [camera, (i + 0.5) / width, (j + 0.5) / height, width / height];
+        clouds.get(shape).push(add(eye(...through), scale(ray(...through), depths.floats[at])));
       }
     }
     return clouds;

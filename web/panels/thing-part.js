@@ -2,9 +2,10 @@
 
 import { element } from "../lib/dom.js";
 import { added } from "../document/materials.js";
+import { inWords } from "../lib/format-text.js";
 import { OnDemand } from "../lib/on-demand.js";
 import { at } from "../lib/patch.js";
-import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "../server/schema.js";
+import { cameraModels, environmentModels, fields, lightModels, shapeModels, transformModel } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
 import * as transforms from "../document/transforms.js";
 import { things } from "../document/things.js";
@@ -23,6 +24,10 @@ export class ThingPart {
       ({ EnvironmentPart }) => new EnvironmentPart(find("environment-ball"), acts),
       { complain: (problem) => acts.complain(problem), arrived: (part) => part.show(this.environment) },
     );
+    find("camera-type").append(
+      ...Object.keys(cameraModels(schema)).map((type) => element("option", { value: type }, inWords(type))),
+    );
+    find("camera-type").addEventListener("change", ({ target }) => acts.turnCamera(target.value));
     find("thing-material").addEventListener("change", ({ target }) => {
       if (target.selectedOptions[0] === this.#newMaterial)
         return acts.change(added(acts.state, "material", acts.plainMaterial));
@@ -55,7 +60,7 @@ export class ThingPart {
   }
 
   #model(document) {
-    if (this.thing === "/camera") return model(this.schema, this.schema, "camera");
+    if (this.thing === "/camera") return cameraModels(this.schema)[this.acts.camera.type];
     const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[
       this.thing.split("/")[1]
     ];
@@ -69,6 +74,8 @@ export class ThingPart {
     this.#find("environment-name").hidden = this.thing !== "/environment";
     this.#find("reset-view").hidden = this.thing !== "/camera";
     this.#find("thing-material-row").hidden = !isShape;
+    this.#find("camera-type-row").hidden = this.thing !== "/camera";
+    this.#find("camera-type").value = this.acts.camera.type;
     if (isShape) {
       const names = Object.keys(scene.materials);
       this.#find("thing-material").replaceChildren(

@@ -1,7 +1,7 @@
 // What a drag of a handle means in the scene. Places are {x, y}, 0..1 across the picture; a view is {camera, aspect,
 // height}, the height in CSS pixels.
 
-import { axes, project, ray } from "../document/camera.js";
+import { axes, eye, halfHeight, project, ray } from "../document/camera.js";
 import { add, cross, dot, normalize, scale, subtract } from "../lib/vector.js";
 
 export const WORLD = [
@@ -18,20 +18,20 @@ const LEAST = 0.01; // of its size that one drag makes of a thing
 // What a CSS pixel at a point's depth covers, in metres.
 export function metresPerPixel({ camera, height }, point) {
   const depth = dot(subtract(point, camera.position), axes(camera).forward);
-  return (2 * depth * Math.tan((camera.vfov * Math.PI) / 360)) / height;
+  return (2 * halfHeight(camera, depth)) / height;
 }
 
 // Where the ray through a place meets the plane through a point, or null where it does not.
 function onPlane({ camera, aspect }, point, normal, { x, y }) {
-  const direction = ray(camera, x, y, aspect);
-  const far = dot(subtract(point, camera.position), normal) / dot(direction, normal);
-  return far > 0 && Number.isFinite(far) ? add(camera.position, scale(direction, far)) : null;
+  const [from, direction] = [eye, ray].map((part) => part(camera, x, y, aspect));
+  const far = dot(subtract(point, from), normal) / dot(direction, normal);
+  return far > 0 && Number.isFinite(far) ? add(from, scale(direction, far)) : null;
 }
 
 // How far along an axis through a point the ray through a place passes nearest to it.
 function along({ camera, aspect }, point, axis, { x, y }) {
-  const direction = ray(camera, x, y, aspect);
-  const between = subtract(camera.position, point);
+  const [from, direction] = [eye, ray].map((part) => part(camera, x, y, aspect));
+  const between = subtract(from, point);
   const slant = dot(axis, direction);
   return (dot(between, axis) - dot(between, direction) * slant) / (1 - slant * slant);
 }

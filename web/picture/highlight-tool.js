@@ -1,7 +1,7 @@
 // A click that says where a highlight has to lie: the chosen light is put, or the environment turned, so that the thing
 // under the click mirrors it to the eye.
 
-import { ray } from "../document/camera.js";
+import { eye, ray } from "../document/camera.js";
 import { mirrored, putOnRay, rotationTo } from "../document/highlights.js";
 import { lampsOf, targetOf } from "../document/lamps.js";
 import { isOn } from "../document/outline.js";
@@ -15,8 +15,9 @@ async function mirroredAt(picker, scene, camera, place, aspect) {
   const depth = await picker.depth(scene, place);
   const normal = depth > 0 ? await picker.normal(scene, place) : null;
   if (!normal || !(length(normal) > 0)) return null;
-  const way = ray(camera, place.x, place.y, aspect);
-  return { point: add(camera.position, scale(way, depth)), way: mirrored(way, scale(normal, 1 / length(normal))) };
+  const through = [camera, place.x, place.y, aspect];
+  const way = ray(...through);
+  return { point: add(eye(...through), scale(way, depth)), way: mirrored(way, scale(normal, 1 / length(normal))) };
 }
 
 // `acts` is the editor, `picker` tells what lies at `place`; `aspect` of the picture. `say(text)`. Raises an Error with

@@ -63,6 +63,7 @@ export class Picks {
 
   async focus(place, aspect) {
     const { camera } = this.acts;
+    if (camera.aperture_radius === undefined) return this.say("Only a camera in perspective has a focus");
     const far = await this.picker.depth(this.acts.state.scene, place);
     if (!(far > 0)) return this.say("Nothing there to focus on");
     const along = far * dot(ray(camera, place.x, place.y, aspect), axes(camera).forward);

@@ -1,6 +1,6 @@
 // The picture under the hand: gestures, keys, and the tools, whose code comes once there is a picture.
 
-import { axes, frame } from "../document/camera.js";
+import { axes, frame, halfHeight } from "../document/camera.js";
 import { watchGestures } from "./gestures.js";
 import { NotReady } from "../server/stream.js";
 import { watchToolbar } from "../lib/tabs.js";
@@ -85,7 +85,7 @@ export class ViewportController {
   // A quarter of what is seen: how large new things are.
   radius() {
     const { camera } = this.acts;
-    const size = axes(camera).distance * Math.tan((camera.vfov * Math.PI) / 360) * 0.25;
+    const size = halfHeight(camera, axes(camera).distance) * 0.25;
     return Number(size.toPrecision(2));
   }
 

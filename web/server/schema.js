@@ -55,6 +55,7 @@ export function blackMaterial(schema) {
 }
 // What a thing is made of that nobody has given anything else.
 export const newMaterial = (schema) => property(schema, schema, "materials")["x-new"];
+export const cameraModels = (schema) => variants(schema, property(schema, schema, "camera"));
 export const environmentModels = (schema) => variants(schema, schema.properties.environment);
 export const shapeModels = (schema) => variants(schema, schema.properties.shapes.items);
 export const lightModels = (schema) => variants(schema, schema.properties.lights.items);

@@ -1,8 +1,8 @@
 """The scene's document as types: dicts whose members an editor and a type checker know.
 
-    from sunbox.document import Camera, DiffuseMaterial, Scene, SphereShape
+    from sunbox.document import DiffuseMaterial, PerspectiveCamera, Scene, SphereShape
 
-    scene: Scene = {"version": 1, "camera": Camera(position=[0, 1, 4], target=[0, 1, 0]), ...}
+    scene: Scene = {"version": 1, "camera": PerspectiveCamera(position=[0, 1, 4], target=[0, 1, 0]), ...}
 
 Written by generate.py from the service's schema; a test holds it to that.
 """
@@ -119,23 +119,6 @@ class BoxShape(TypedDict, total=False):
     """Where the shape stands; without it, as written."""
     visible_to_camera: bool
     """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
-
-
-class Camera(TypedDict, total=False):
-    """Looks from `position` to `target`."""
-
-    position: Required[list[float]]
-    """Where the camera stands. (m)"""
-    target: Required[list[float]]
-    """The point in the middle of the picture. (m)"""
-    up: list[float]
-    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
-    vfov: float
-    """Vertical angle; 40 is a short telephoto, 75 a wide angle. (degrees, 0 to 180, default 40.0)"""
-    aperture_radius: float
-    """0 is a pinhole, sharp everywhere; larger blurs what is out of focus. (m, 0 to 1e+09, default 0.0)"""
-    focus_distance: float
-    """Along the axis to the plane that is sharp; without it, the target's. (m, 0 to 1e+09)"""
 
 
 class CheckerTexture(TypedDict, total=False):
@@ -555,6 +538,52 @@ class OpenpbrMaterial(TypedDict, total=False):
     """Relief: bends the normal, and moves the surface of meshes with displacement."""
 
 
+class OrthographicCamera(TypedDict, total=False):
+    """Parallel rays from the plane through `position`: nothing gets smaller with its distance, as in plans."""
+
+    type: Required[Literal["orthographic"]]
+    height: Required[float]
+    """What the picture shows from bottom to top. (m, 0 to 1e+09)"""
+    position: Required[list[float]]
+    """Where the camera stands. (m)"""
+    target: Required[list[float]]
+    """The point in the middle of the picture. (m)"""
+    up: list[float]
+    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+
+
+class PanoramaCamera(TypedDict, total=False):
+    """All directions around `position`, in latitude and longitude as an environment's image has them, and `target` in
+    the middle of the picture."""
+
+    type: Required[Literal["panorama"]]
+    position: Required[list[float]]
+    """Where the camera stands. (m)"""
+    target: Required[list[float]]
+    """The point in the middle of the picture. (m)"""
+    up: list[float]
+    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+
+
+class PerspectiveCamera(TypedDict, total=False):
+    """Looks through a lens: what is farther away is smaller."""
+
+    type: Literal["perspective"]
+    """default 'perspective'"""
+    vfov: float
+    """Vertical angle; 40 is a short telephoto, 75 a wide angle. (degrees, 0 to 180, default 40.0)"""
+    aperture_radius: float
+    """0 is a pinhole, sharp everywhere; larger blurs what is out of focus. (m, 0 to 1e+09, default 0.0)"""
+    focus_distance: float
+    """Along the axis to the plane that is sharp; without it, the target's. (m, 0 to 1e+09)"""
+    position: Required[list[float]]
+    """Where the camera stands. (m)"""
+    target: Required[list[float]]
+    """The point in the middle of the picture. (m)"""
+    up: list[float]
+    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+
+
 class PhongMaterial(TypedDict, total=False):
     """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
 
@@ -778,6 +807,9 @@ class SpotLight(TypedDict, total=False):
     """From the beam's axis to where nothing is left; equal to the inner: a sharp edge. (degrees, 0 to 90)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
+
+
+Camera = PerspectiveCamera | OrthographicCamera | PanoramaCamera
 
 
 Environment = ConstantEnvironment | ImageEnvironment | CubemapEnvironment | SkyEnvironment

@@ -63,8 +63,7 @@ def _light(place: JsonView, node: Node, notes: Warnings) -> dict[str, Any]:
 def camera(
     file: GltfDocument, nodes: list[Node], bounds: Bounds, notes: Warnings
 ) -> tuple[dict[str, Any] | None, float | None]:
-    """The scene's first perspective camera, and the width of its picture over the height; None where there is
-    none."""
+    """The scene's first camera, and the width of its picture over the height; None where there is none."""
     chosen: dict[str, Any] | None = None
     aspect: float | None = None
     for node in nodes:
@@ -76,23 +75,26 @@ def camera(
             notes.add(node.place.at("camera"), "this camera is not used; the scene's first camera is used instead")
         elif kind == "perspective":
             lens = place.need("perspective")
-            chosen = _perspective(lens, node, bounds)
+            vfov = math.degrees(lens.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
+            chosen = _placed(node, bounds) | {"vfov": vfov}
             aspect = lens.number("aspectRatio", 1, 1e-6, 1e6) if "aspectRatio" in lens else None
         elif kind == "orthographic":
-            notes.add(place.pointer, f"orthographic cameras are not supported; {INSTEAD}")
+            lens = place.need("orthographic")
+            width, height = (lens.number(name, 1, 1e-9, 1e9) for name in ("xmag", "ymag"))
+            chosen = _placed(node, bounds) | {"type": "orthographic", "height": 2 * height}
+            aspect = width / height if width != height else None  # 1:1 stands for any
         else:
             notes.add(place.at("type"), f"must be perspective or orthographic, not {shown(kind)}; {INSTEAD}")
     return chosen, aspect
 
 
-def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:
+def _placed(node: Node, bounds: Bounds) -> dict[str, Any]:
     position, forward = node.world[:3, 3], np.array(_axis(node, 2, -1))
     # At the distance of the model, so that turning about the target turns about the model.
     distance = float((sum(bounds) / 2 - position) @ forward)
     size = float(np.linalg.norm(bounds[1] - bounds[0]))
     target = position + forward * (distance if distance > 0.01 * size else max(size, 1.0))
-    vfov = math.degrees(place.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
-    return {"position": position.tolist(), "target": target.tolist(), "up": _axis(node, 1, 1), "vfov": vfov}
+    return {"position": position.tolist(), "target": target.tolist(), "up": _axis(node, 1, 1)}
 
 
 def _axis(node: Node, axis: int, sign: int) -> list[float]:

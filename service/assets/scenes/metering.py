@@ -37,11 +37,10 @@ def exposure(document: dict[str, Any], placed: list[Placed], aspect: float | Non
     solid = [one for one in placed if not _is_clear(materials[one.material])]
     scene, found = Scene(solid or placed), _Metered(document)
     camera = document["camera"]
-    position = np.array(camera["position"], np.float64)
-    for direction in _directions(camera, aspect or 1.0):
-        hit = scene.nearest(position, direction)
+    for origin, direction in zip(*_rays(camera, aspect or 1.0), strict=True):
+        hit = scene.nearest(origin, direction)
         if hit is not None:
-            found.add(scene, position + hit.distance * direction, hit)
+            found.add(scene, origin + hit.distance * direction, hit)
     luminances = found.luminances()
     lit = luminances[luminances > 0]
     if len(lit) < FEWEST:
@@ -118,16 +117,21 @@ def _arriving(light: dict[str, Any], point: Doubles, normal: Doubles) -> tuple[f
     return amount, way
 
 
-def _directions(camera: dict[str, Any], aspect: float) -> Doubles:
-    """(GRID^2, 3): the directions through the middles of a grid of cells that fill the picture."""
+def _rays(camera: dict[str, Any], aspect: float) -> tuple[Doubles, Doubles]:
+    """(GRID^2, 3) twice: where the rays through the middles of a grid of cells begin, and where they go. The grid
+    fills the picture."""
     forward = np.subtract(camera["target"], camera["position"])
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, camera.get("up", (0.0, 1.0, 0.0)))
     right = right / np.linalg.norm(right)
-    slope = math.tan(math.radians(camera["vfov"] / 2))
+    is_parallel = camera.get("type") == "orthographic"
+    half = camera["height"] / 2 if is_parallel else math.tan(math.radians(camera["vfov"] / 2))
     y, x = np.meshgrid(*[(np.arange(GRID) + 0.5) / GRID * 2 - 1] * 2, indexing="ij")
-    rays = forward + slope * (aspect * x[..., None] * right + y[..., None] * np.cross(right, forward))
-    return np.asarray(rays.reshape(-1, 3))
+    across = half * (aspect * x[..., None] * right + y[..., None] * np.cross(right, forward)).reshape(-1, 3)
+    position, straight = np.array(camera["position"], np.float64), np.zeros_like(across)
+    if is_parallel:
+        return position + across, forward + straight
+    return position + straight, forward + across
 
 
 def _scattered(number: int, normal: Doubles) -> Doubles:

@@ -19,16 +19,13 @@ TENTH = 0.1  # scene units: the unit of focal lengths and apertures
 def camera(
     items: list[Item], time: Usd.TimeCode, unit: float, bounds: Bounds, notes: Warnings
 ) -> tuple[dict[str, Any] | None, float | None]:
-    """The first perspective camera, and the width of its picture over the height; None where there is none."""
+    """The first camera, and the width of its picture over the height; None where there is none."""
     chosen: dict[str, Any] | None = None
     aspect: float | None = None
     for item in items:
         lens = UsdGeom.Camera(item.prim)
         if chosen is not None:
             notes.add(item.pointer, "this camera is not used; the scene's first camera is used instead")
-            continue
-        if lens.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic:
-            notes.add(item.pointer, f"orthographic cameras are not supported; {INSTEAD}")
             continue
         width, height = (
             float(a.Get(time)) for a in (lens.GetHorizontalApertureAttr(), lens.GetVerticalApertureAttr())
@@ -40,15 +37,18 @@ def camera(
         for offset in (lens.GetHorizontalApertureOffsetAttr(), lens.GetVerticalApertureOffsetAttr()):
             if offset.Get(time):
                 notes.add(item.pointer, "a shifted aperture is not supported; the picture is centred")
-        vfov = math.degrees(2 * math.atan(height / 2 / focal))
-        chosen, aspect = _placed(item, min(max(vfov, 1e-3), 179.9), bounds), width / height
+        chosen, aspect = _placed(item, bounds), width / height
+        if lens.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic:
+            chosen |= {"type": "orthographic", "height": height * TENTH * unit}
+            continue
+        chosen["vfov"] = min(max(math.degrees(2 * math.atan(height / 2 / focal)), 1e-3), 179.9)
         stop, focus = (float(a.Get(time) or 0) for a in (lens.GetFStopAttr(), lens.GetFocusDistanceAttr()))
         if stop > 0 and focus > 0:
             chosen |= {"aperture_radius": focal * TENTH * unit / (2 * stop), "focus_distance": focus * unit}
     return chosen, aspect
 
 
-def _placed(item: Item, vfov: float, bounds: Bounds) -> dict[str, Any]:
+def _placed(item: Item, bounds: Bounds) -> dict[str, Any]:
     world = item.worlds[0]
     axes = world[:3, :3] / np.maximum(np.linalg.norm(world[:3, :3], axis=0), 1e-30)
     position, forward = world[:3, 3], -axes[:, 2]
@@ -56,4 +56,4 @@ def _placed(item: Item, vfov: float, bounds: Bounds) -> dict[str, Any]:
     distance = float((sum(bounds) / 2 - position) @ forward)
     size = float(np.linalg.norm(bounds[1] - bounds[0]))
     target = position + forward * (distance if distance > 0.01 * size else max(size, 1.0))
-    return {"position": position.tolist(), "target": target.tolist(), "up": axes[:, 1].tolist(), "vfov": vfov}
+    return {"position": position.tolist(), "target": target.tolist(), "up": axes[:, 1].tolist()}

@@ -10,12 +10,13 @@ import numpy as np
 from service.assets.types import Doubles
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
-from service.scene import Camera, Scene
+from service.scene import Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera, Scene
 from service.scene.light import DirectionalLight, Light, SpotLight
 from service.scene.named import Named
 
 SHEARED = 1e-7  # cosine between axes of a matrix from which on it is no translation, rotation and scale
 NEAR = 1e-3  # of the distance to the target: where a rasteriser begins to draw
+FAR = 1e3  # the same: where it ends
 SHARP = 1 - 1e-6  # of the outer angle, which glTF wants to be above the inner one
 
 
@@ -64,7 +65,10 @@ class Nodes:
 
 
 def add_camera(camera: Camera, nodes: Nodes, losses: Losses) -> None:
-    if camera.aperture_radius > 0:
+    if isinstance(camera, PanoramaCamera):
+        losses.add("/camera/type", "glTF has no panoramas: there is no camera in the file")
+        return
+    if isinstance(camera, PerspectiveCamera) and camera.aperture_radius > 0:
         losses.add("/camera/aperture_radius", "glTF's cameras have no depth of field: everything is sharp")
     for name in sorted(camera.model_fields_set - {*_CAMERA}):
         if getattr(camera, name) not in (type(camera).model_fields[name].default, None):
@@ -77,12 +81,16 @@ def add_camera(camera: Camera, nodes: Nodes, losses: Losses) -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, np.cross(right, forward), -forward], axis=1)
     matrix[:3, 3] = position
-    lens = {"yfov": math.radians(camera.vfov), "znear": NEAR * distance}
-    index = nodes.builder.add("cameras", {"type": "perspective", "perspective": lens})
+    if isinstance(camera, OrthographicCamera):
+        half = camera.height / 2
+        lens = {"xmag": half, "ymag": half, "znear": 0.0, "zfar": FAR * distance}
+    else:
+        lens = {"yfov": math.radians(camera.vfov), "znear": NEAR * distance}
+    index = nodes.builder.add("cameras", {"type": camera.type, camera.type: lens})
     nodes.add({"camera": index}, None, matrix)
 
 
-_CAMERA = ("position", "target", "up", "vfov", "aperture_radius", "focus_distance", "type")
+_CAMERA = ("position", "target", "up", "vfov", "aperture_radius", "focus_distance", "height", "type")
 
 
 def add_lights(scene: Scene, nodes: Nodes, losses: Losses) -> None:

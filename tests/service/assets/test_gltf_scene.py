@@ -207,13 +207,15 @@ def test_the_first_camera(store: AssetStore) -> None:
     assert found.aspect_ratio == 1.5
 
 
-def test_an_orthographic_camera_is_framed_instead(store: AssetStore) -> None:
+def test_an_orthographic_camera_is_taken(store: AssetStore) -> None:
     file = Gltf()
     file.node(mesh=file.mesh())
-    lens = {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}}
-    file.node(camera=file.add("cameras", lens))
+    lens = {"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 0, "zfar": 100}}
+    file.node(camera=file.add("cameras", lens), translation=[0, 0, 5])
     found = imported(store, file)
-    assert "orthographic" in noted(found)["/cameras/0"] and found.document["camera"]["target"] == [0, 0, 0]
+    camera = found.document["camera"]
+    assert (camera["type"], camera["height"], camera["position"]) == ("orthographic", 4, [0, 0, 5])
+    assert np.allclose(camera["target"], [0, 0, 0], atol=1e-6) and found.aspect_ratio == 1.5
 
 
 @pytest.mark.parametrize("scale", [[1, 1, 1], [5, 1, 3], [1, 5, 0.001], [3, 2, 1000]])

@@ -41,7 +41,7 @@ def test_camera_is_orthonormal_and_right_handed():
     np.testing.assert_allclose(np.cross(axes[0], axes[1]), -axes[2], atol=rounding)
     assert camera["up"][1] > 0
     assert camera["focus_distance"] == pytest.approx(np.sqrt(9 + 4 + 64))
-    assert camera["tan_half_vfov"] == pytest.approx(np.tan(np.radians(20)))
+    assert camera["half_height"] == pytest.approx(np.tan(np.radians(20)))
 
 
 def test_camera_looks_as_a_photographer_would():
@@ -102,9 +102,14 @@ def test_every_number_of_a_material_has_its_place(model):
     if model == "openpbr":  # its emission is a product, and its tangents become angles
         own = {name for name in own if not name.startswith(("emission", "geometry"))} | {"geometry_opacity"}
     for i, name in enumerate(sorted(own)):
-        coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name == "sheen_color"
+        coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name in (
+            "sheen_color",
+            "conductor_eta",
+            "conductor_k",
+        )
         value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.0101 * i
-        material = {"type": model, **required, name: value}
+        other = {"conductor_eta": "conductor_k", "conductor_k": "conductor_eta"}.get(name)  # either needs the other
+        material = {"type": model, **required, name: value} | ({other: 3} if other else {})
         record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
         assert record["model"] == NUMBERS[model]
         places = [m for m in layout.Material.members if np.array_equal(record[m], np.float32(value))]

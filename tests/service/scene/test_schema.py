@@ -46,7 +46,7 @@ NUMERIC = [(name, prop) for name, prop in properties() if is_numeric(prop)]
 
 def test_is_json_and_names_its_models() -> None:
     json.dumps(WHOLE, allow_nan=False)
-    assert {"Camera", "DisneyMaterial", "DiffuseMaterial", "SphereShape", "PointLight"} <= set(models())
+    assert {"PerspectiveCamera", "DisneyMaterial", "DiffuseMaterial", "SphereShape", "PointLight"} <= set(models())
     for reference in re.findall(r'"#/\$defs/(\w+)"', json.dumps(WHOLE)):
         assert reference in WHOLE["scene"]["$defs"]
 

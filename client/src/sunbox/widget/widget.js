@@ -1183,7 +1183,15 @@ const forward=normalize(view);
 const right=normalize(cross(forward,up));
 return{right,up:cross(right,forward),forward,distance:length(view)};
 }
-const halfHeight = ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2);
+function halfHeight({type,vfov,height},distance){
+if (type === "orthographic") return height / 2;
+return distance * (type === "panorama" ? Math.PI / 2 : Math.tan(radians(vfov) / 2));
+}
+function turned(camera,type){
+const{position,target,up}=camera;
+const height=Number((2 * halfHeight(camera,axes(camera).distance)).toPrecision(3));
+return { type, position, target, up, ...(type === "orthographic" ? { height } : {}) };
+}
 function pan(camera,right,down){
 const{position,target}=camera;
 const frame=axes(camera);
@@ -1191,17 +1199,24 @@ const height=2 * halfHeight(camera,frame.distance);
 const shift=add(scale(frame.right,-right * height),scale(frame.up,down * height));
 return{position:tidy(add(position,shift)),target:tidy(add(target,shift))};
 }
-const zoom=({position,target},factor)=>({
-position:tidy(add(target,scale(subtract(position,target),factor))),
-});
+const zoom=({type,position,target,height},factor)=>
+type === "orthographic"
+?{height:Number((height * factor).toPrecision(6))}
+:{position:tidy(add(target,scale(subtract(position,target),factor)))};
 function frame(camera,{center,radius},aspect,share=0.8){
-const{position,target}=camera;
-const half=Math.atan(halfHeight(camera,1)* Math.min(1,aspect));
+const{type,position,target}=camera;
+const narrow=Math.min(1,aspect);
+if (type === "orthographic") {
+const back=scale(normalize(subtract(position,target)),Math.max(axes(camera).distance,2 * radius));
+const height = Number(((2 * radius) / (share * narrow)).toPrecision(4));
+return{position:tidy(add(center,back)),target:tidy(center),height};
+}
+const half=Math.atan(halfHeight(camera,1)* narrow);
 const distance = radius / Math.sin(Math.max(half * share, 1e-3));
 const back=normalize(subtract(position,target));
 return{position:tidy(add(center,scale(back,distance))),target:tidy(center)};
 }
-return { axes, frame, halfHeight, orbit, pan, zoom };
+return { axes, frame, halfHeight, orbit, pan, turned, zoom };
 })();
 const picture_gestures = (() => {
 const ORBIT_PER_WIDTH=Math.PI;
