@@ -83,7 +83,20 @@ OPENPBR = {
     "fine fuzz": openpbr(sheen=1, sheen_roughness=0.15, specular=0),
     "layers": openpbr(**RED_COAT, sheen=0.5, transmission=0.3, metallic=0.3, diffuse_roughness=0.5, roughness=0.5),
 }
-LAYERED = PRINCIPLED | OPENPBR
+WALL = {"model": P, "thin_walled": 1}
+LEAF = {**WALL, "base_color": (0.2, 0.5, 0.1), "diffuse_transmission": 0.5}
+WALLS = {
+    "frosted pane": materials(**WALL, transmission=1, base_color=(1, 0.8, 0.6), roughness=0.5),
+    "rough pane": materials(**WALL, transmission=0.7, roughness=0.9, ior=2.2, specular_color=(1, 0.4, 0.2)),
+    "brushed pane": materials(**WALL, transmission=1, roughness=0.5, anisotropic=0.8, anisotropic_rotation=30),
+    "leaf": materials(**LEAF, diffuse_transmission_color=(0.4, 0.8, 0.1), roughness=0.4),
+    "waxed leaf": materials(**LEAF, clearcoat=1, clearcoat_roughness=0.4, sheen=0.5, subsurface=0.6),
+    "oiled paper": materials(**LEAF, transmission=0.5, roughness=0.6, metallic=0.2, clearcoat=0.5, clearcoat_gloss=0),
+    "openpbr pane": openpbr(thin_walled=1, transmission=0.9, attenuation_color=(1, 0.8, 0.6), roughness=0.6),
+    "bubble's wall": openpbr(thin_walled=1, transmission=1, ior=0.7, roughness=0.5),
+    "coated pane": openpbr(thin_walled=1, **RED_COAT, transmission=0.9, roughness=0.4, sheen=0.3),
+}
+LAYERED = PRINCIPLED | OPENPBR | WALLS
 
 
 class Grid:

@@ -41,7 +41,7 @@ def materials(**members: Any) -> np.ndarray:
     defaults = {"base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0}
     defaults["opacity"] = 1.0
     defaults |= {"specular_color": 1.0, "attenuation_color": 1.0, "sheen_roughness": 0.5}
-    for name in ("ior", "attenuation_distance", "clearcoat_roughness", "sheen_color"):
+    for name in ("ior", "attenuation_distance", "clearcoat_roughness", "sheen_color", "diffuse_transmission_color"):
         defaults[name] = layout.ABSENT
     for name, value in {**defaults, **members}.items():
         out[name] = value
@@ -57,7 +57,8 @@ def openpbr(**members: Any) -> np.ndarray:
 
 def rare(record: np.ndarray) -> frozenset[str]:
     """The flags that a material raises for code which kernels have only where a scene needs it."""
-    return frozenset({"HAS_CONDUCTOR"} if (record["conductor_eta"] > 0).any() else ())
+    members = {"HAS_CONDUCTOR": "conductor_eta", "HAS_THIN_WALLS": "thin_walled"}
+    return frozenset(flag for flag, member in members.items() if (record[member] > 0).any())
 
 
 class Prober:

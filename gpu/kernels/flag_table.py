@@ -122,8 +122,13 @@ def _term(kind: str, value: int) -> Asks:
 
 def _transmits(materials: np.ndarray) -> np.ndarray:
     m = materials
-    out: np.ndarray = of(m, TRANSMITTING) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    through = (m["transmission"] > 0) | ((m["thin_walled"] > 0) & (m["diffuse_transmission"] > 0))
+    out: np.ndarray = of(m, TRANSMITTING) & through & (m["metallic"] < 1)
     return out
+
+
+def _thin_walls(s: SceneArrays) -> bool:
+    return bool((_transmits(s.materials) & (s.materials["thin_walled"] > 0)).any())
 
 
 def _mirrors(materials: np.ndarray) -> np.ndarray:
@@ -146,7 +151,8 @@ def _spreads(s: SceneArrays, model: Model) -> bool:
 
 
 def _attenuates(s: SceneArrays) -> bool:
-    return bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any())
+    m = s.materials
+    return bool((_transmits(m) & (m["thin_walled"] == 0) & (m["attenuation_distance"] > 0)).any())
 
 
 def _slot_flags(scene: SceneArrays) -> np.ndarray:
@@ -358,6 +364,13 @@ _ROWS = (
         compiled_with=_flags_of(TRANSMITTING),
     ),
     Flag("HAS_MIRRORS", lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()), spares=True),
+    Flag(
+        "HAS_THIN_WALLS",
+        _thin_walls,
+        evaluated_with=_flags_of(TRANSMITTING),
+        previewed=_any_of(TRANSMITTING),
+        in_general=False,
+    ),
     Flag("HAS_ATTENUATION", _attenuates, previewed=_any_of(TRANSMITTING)),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

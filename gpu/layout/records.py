@@ -90,6 +90,8 @@ class Material(Record):
     cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
     alpha: f32  # parameter of microfacet's distribution; its f0 is specular_color, its diffuse base_color
     number: u32  # of the material in the scene: microfacet's record
+    diffuse_transmission_color: vec3  # of a thin wall; ABSENT: base_color
+    diffuse_transmission: f32  # share of a thin wall's diffuse light that goes through
     # of openpbr, whose transmission_color is attenuation_color
     coat_color: vec3  # what is left of light that crosses the coat twice, straight
     coat_ior: f32
@@ -100,6 +102,7 @@ class Material(Record):
     coat_darkening: f32
     coat_anisotropy: f32
     coat_rotation: f32  # degrees
+    thin_walled: f32  # 1: its surfaces are walls without an inside
 
 
 class Sphere(Record):

@@ -41,6 +41,7 @@ RENAMED_IN = {
         "fuzz_roughness": "sheen_roughness",
         "emission_color": "emission",
         "geometry_opacity": "opacity",
+        "geometry_thin_walled": "thin_walled",
         "geometry_normal": "normal",
         "geometry_tangent": "anisotropic_rotation",
         "geometry_coat_normal": "coat_normal",

@@ -86,7 +86,11 @@ LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
         r.wi = sampling_hemisphere(u);
         r.scatter.pdf = 0.5 * INV_PI;
 #if HAS_TRANSMISSION
-        if (model_transmits(s.model) && s.transmission > 0.0) {
+        bool through = s.transmission > 0.0;
+#if HAS_THIN_WALLS
+        through = through || s.diffuse_transmission > 0.0;
+#endif
+        if (model_transmits(s.model) && through) {
             r.wi = sampling_sphere(u);
             r.scatter.pdf *= 0.5;
         }

@@ -1,8 +1,20 @@
 // Predicates over a material's numbers, before it is a surface. gpu/kernels/flag_table.py has the same over arrays.
 
+// Whether its surfaces are walls without an inside.
+bool material_is_thin(Material m) {
+#if HAS_THIN_WALLS
+    return m.thin_walled > 0.0;
+#else
+    return false;
+#endif
+}
+
 // Whether light passes through its surfaces.
 bool material_transmits(Material m) {
-#if HAS_TRANSMISSION
+#if HAS_THIN_WALLS
+    bool through = m.transmission > 0.0 || (material_is_thin(m) && m.diffuse_transmission > 0.0);
+    return model_transmits(m.model) && through && m.metallic < 1.0;
+#elif HAS_TRANSMISSION
     return model_transmits(m.model) && m.transmission > 0.0 && m.metallic < 1.0;
 #else
     return false;

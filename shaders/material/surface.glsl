@@ -37,6 +37,12 @@ struct Surface {
     float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
     float sheen_roughness; // for the tables
     float sheen_albedo;    // the share that the sheen keeps from what is under it
+#if HAS_THIN_WALLS
+    bool is_thin;               // a wall without an inside: bsdf/lobes/base/pane.glsl
+    float pane_narrowing;       // alpha of the lobe that goes through over that of the reflected one
+    float diffuse_transmission; // share of the diffuse light that goes through
+    vec3 diffuse_through;       // its colour
+#endif
 #endif
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame

@@ -17,7 +17,7 @@ struct Interaction {
 void interaction_media(Material m, inout Interaction here, inout Path path) {
 #if HAS_ATTENUATION
     vec3 rate = surface_attenuation(m);
-    bool clear = here.transmits;
+    bool clear = here.transmits && !material_is_thin(m);
     if (clear && here.behind && path.medium.depth < 0.5) {
         // This is the back of an open sheet: the path counts as inside a body since it began.
         path.medium = medium_entered(path.medium, rate);

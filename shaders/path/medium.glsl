@@ -62,7 +62,7 @@ Medium medium_at(vec3 from) {
 #else
         Material m = material_pick(at.material);
 #endif
-        bool counts = more && material_transmits(m);
+        bool counts = more && material_transmits(m) && !material_is_thin(m);
 #if HAS_HIDDEN_SHAPES
         counts = counts && (at.shape & HIDDEN) == 0u;
 #endif

@@ -526,6 +526,8 @@ class OpenpbrMaterial(TypedDict, total=False):
     """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
     geometry_opacity: float | ScalarTexture
     """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    geometry_thin_walled: bool
+    """A sheet without an inside: light goes straight through. (default False)"""
     geometry_normal: NormalTexture
     """Bends the surface's normal without moving the surface."""
     geometry_tangent: list[float]
@@ -659,6 +661,13 @@ class PrincipledMaterial(TypedDict, total=False):
     """What is left of white light after the attenuation distance inside. (0 to 1, default [1.0, 1.0, 1.0])"""
     attenuation_distance: float | ScalarTexture
     """How far inside light takes the attenuation colour; without it, clear. (m, 0 to 1e+09)"""
+    thin_walled: bool
+    """A sheet without an inside, as a window pane or a leaf: light goes straight through. (default False)"""
+    diffuse_transmission: float | ScalarTexture
+    """Share of the diffuse light that leaves on the other side, as of leaves and paper; above 0 a thin wall. (0 to 1,
+    default 0.0)"""
+    diffuse_transmission_color: list[float] | float | str | ColorTexture
+    """Of the diffuse light that goes through, in place of the base colour. (0 to 1)"""
     specular_color: list[float] | float | str | ColorTexture
     """Tints the dielectric's reflection head-on; grazing stays white. (0 to 1, default [1.0, 1.0, 1.0])"""
     anisotropic_rotation: float | ScalarTexture

@@ -44,7 +44,7 @@ def odd_meshes(found: Iterable[OddMesh], materials: np.ndarray, emissive: np.nda
 
 def _odd(mesh: OddMesh, material: np.void, emits: bool) -> str:
     """One line with the oddities that matter under this material; "" where none does."""
-    odd, transmits = mesh.oddities, material["transmission"] != 0
+    odd, transmits = mesh.oddities, material["transmission"] != 0 and material["thin_walled"] == 0
     fades = material["opacity"] != 1 and material["cutoff"] == layout.ABSENT
     has_inside = transmits or (emits and material["emission_sides"] == 1)
     parts = list[str]()

@@ -34,7 +34,7 @@ UNSUPPORTED = (
     "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "transmission_dispersion_scale",
     "transmission_dispersion_abbe_number", "subsurface_weight", "subsurface_color", "subsurface_radius",
     "subsurface_radius_scale", "subsurface_scatter_anisotropy", "thin_film_weight", "thin_film_thickness",
-    "thin_film_ior", "geometry_thin_walled",
+    "thin_film_ior",
 )  # fmt: skip
 
 Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
@@ -298,6 +298,13 @@ class OpenpbrMaterial(AnySurface):
             widget="slider",
         ),
     ] = 1.0
+    geometry_thin_walled: Annotated[
+        bool,
+        hint(
+            "Thin walled", "A sheet without an inside: light goes straight through.",
+            known_as="thin_walled", group="Geometry",
+        ),
+    ] = False  # fmt: skip
     geometry_normal: Annotated[
         NormalTexture | None,
         OMITTABLE,

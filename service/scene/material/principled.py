@@ -17,6 +17,7 @@ from service.scene.texture import (
     AnyLength,
     AnyReflectance,
     NormalTexture,
+    ScalarTexture,
 )
 
 
@@ -78,6 +79,36 @@ class PrincipledMaterial(DisneyMaterial):
             widget="slider",
             soft=5,
             absent="clear",
+        ),
+    ] = None
+    thin_walled: Annotated[
+        bool,
+        hint(
+            "Thin walled",
+            "A sheet without an inside, as a window pane or a leaf: light goes straight through.",
+            group="Transmission",
+        ),
+    ] = False
+    diffuse_transmission: Annotated[
+        AnyFraction,
+        hint(
+            "Diffuse transmission",
+            "Share of the diffuse light that leaves on the other side, as of leaves and paper; above 0 a thin wall.",
+            group="Transmission",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    diffuse_transmission_color: Annotated[
+        AnyReflectance | None,
+        OMITTABLE,
+        hint(
+            "Diffuse transmission colour",
+            "Of the diffuse light that goes through, in place of the base colour.",
+            group="Transmission",
+            unit="",
+            widget="color",
+            absent="base colour",
         ),
     ] = None
     specular_color: Annotated[
@@ -188,3 +219,13 @@ class PrincipledMaterial(DisneyMaterial):
         for name in names:
             del made[name]
         return set()
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether its surfaces are walls without an inside: those that pass diffuse light always are."""
+        through = self.diffuse_transmission
+        passes = through.factor > 0 if isinstance(through, ScalarTexture) else through > 0
+        return self.thin_walled or passes
+
+    def value(self, name: str) -> Any:
+        return self.is_thin if name == "thin_walled" else super().value(name)

@@ -2,6 +2,7 @@
 // The base is reciprocal. A layer of albedo E for wo leaves 1 - E of the light to what is under it, whatever wi is:
 // nothing is lost so, where a reciprocal rule would lose up to a tenth under a white coat.
 #include "bsdf/energy.glsl"
+#include "bsdf/lobes/base/pane.glsl"
 #include "bsdf/lobes/base/multiscatter.glsl"
 #include "bsdf/lobes/base/specular.glsl"
 #include "bsdf/lobes/base/base.glsl"
@@ -72,6 +73,11 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
     s.is_delta = roughness < LEAST_ROUGHNESS;
+#if HAS_THIN_WALLS
+    s.is_thin = m.thin_walled > 0.0;
+    s.pane_narrowing = pane_narrowing(s.eta_outside);
+    s.diffuse_transmission = 0.0;
+#endif
     s.alpha = openpbr_alpha(roughness, m.anisotropic, s.aspect);
     s.roughness = sqrt(sqrt(s.alpha.x * s.alpha.y)); // of the round lobe that the tables stretch
 #if HAS_ANISOTROPIC
@@ -112,9 +118,17 @@ vec3 openpbr_base_albedo(Surface s, out float roughness) {
 }
 #endif
 
+// Whether wo is inside a body that transmits. A thin wall is the same from both sides.
+bool openpbr_is_bare(Surface s, bool behind) {
+#if HAS_THIN_WALLS
+    if (s.is_thin) return false;
+#endif
+    return behind && s.transmission > 0.0 && s.metallic < 1.0;
+}
+
 // Completes the surface with what depends on wo.
 void openpbr_face(vec3 wo, bool behind, inout Surface s) {
-    s.bare = behind && s.transmission > 0.0 && s.metallic < 1.0;
+    s.bare = openpbr_is_bare(s, behind);
     base_side(behind != s.turned_out, s);
     s.albedo = base_albedo(s, wo);
     s.albedo_mean = base_albedo_mean(s);
@@ -284,7 +298,7 @@ float openpbr_delta_chance(Surface s, vec3 wo) {
 
 // What openpbr_sample gives for a surface that only mirrors or refracts, without the work for other lobes.
 LobeSample openpbr_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
-    s.bare = behind && s.transmission > 0.0 && s.metallic < 1.0;
+    s.bare = openpbr_is_bare(s, behind);
     return base_sample_delta(wo, behind != s.turned_out, u_lobe, s);
 }
 

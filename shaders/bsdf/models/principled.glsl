@@ -5,6 +5,7 @@
 #include "bsdf/lobes/principled/diffuse.glsl"
 #include "bsdf/lobes/principled/sheen_charlie.glsl"
 #include "bsdf/lobes/principled/clearcoat.glsl"
+#include "bsdf/lobes/base/pane.glsl"
 #include "bsdf/lobes/base/multiscatter.glsl"
 #include "bsdf/lobes/base/specular.glsl"
 #include "bsdf/lobes/base/base.glsl"
@@ -28,6 +29,12 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.transmission = m.transmission;
 #endif
     s.is_delta = m.roughness < LEAST_ROUGHNESS;
+#if HAS_THIN_WALLS
+    s.is_thin = m.thin_walled > 0.0;
+    s.pane_narrowing = pane_narrowing(s.eta_outside);
+    s.diffuse_transmission = s.is_thin ? m.diffuse_transmission : 0.0;
+    s.diffuse_through = m.diffuse_transmission_color.x >= 0.0 ? m.diffuse_transmission_color : m.base_color;
+#endif
     s.aspect = 1.0;
 #if HAS_ANISOTROPIC
     s.aspect = sqrt(1.0 - 0.9 * m.anisotropic);
@@ -144,7 +151,14 @@ void principled_face(vec3 wo, bool behind, inout Surface s) {
 
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
     float clear = base_clear(s);
-    BaseWeights base = base_weights(s, wo, principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear)));
+    float diffuse = principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear));
+#if HAS_THIN_WALLS
+    float through = s.diffuse_transmission * principled_through_weight(s, multiscatter_albedo(s.albedo, clear));
+    BaseWeights base = base_weights(s, wo, (1.0 - s.diffuse_transmission) * diffuse);
+    base.diffuse_below += through;
+#else
+    BaseWeights base = base_weights(s, wo, diffuse);
+#endif
     float under = principled_layers(s, 0.0, 0.0);
     PrincipledWeights w = PrincipledWeights(base, 0.0, 0.0);
     w.base.diffuse *= under;
@@ -168,8 +182,16 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_TRANSMISSION
     if (wi.z < 0.0) {
         Scatter below = base_eval_below(s, wo, wi, albedo_i, w.base);
-        float coat_i = s.inside ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
-        float sheen_i = s.inside ? principled_sheen_albedo(s, wi.z) : 0.0;
+        bool leaves = s.inside; // into the air, through the layers there
+#if HAS_THIN_WALLS
+        leaves = leaves || s.is_thin;
+        float clear = base_clear(s);
+        below.f += LOBE(LOBE_DIFFUSE, principled_through_eval(s, multiscatter_albedo(s.albedo, clear),
+                                                              multiscatter_albedo(albedo_i, clear),
+                                                              multiscatter_albedo(s.albedo_mean, clear)));
+#endif
+        float coat_i = leaves ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
+        float sheen_i = leaves ? principled_sheen_albedo(s, wi.z) : 0.0;
         below.f *= principled_layers(s, coat_i, sheen_i);
         return below;
     }
@@ -179,6 +201,9 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     vec3 diffuse = principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
                                            multiscatter_albedo(albedo_i, clear),
                                            multiscatter_albedo(s.albedo_mean, clear));
+#if HAS_THIN_WALLS
+    diffuse *= 1.0 - s.diffuse_transmission;
+#endif
     Scatter r = base_eval(s, wo, wi, wm, albedo_i, diffuse, w.base);
     if (!s.inside) {
         float coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));

@@ -96,6 +96,7 @@ def test_every_number_of_a_material_has_its_place(model):
         "normal_map",
         "clearcoat_normal_map",
         "height",
+        "thin_walled",
     }
     if model == "microfacet":  # the rest has a record of its own
         own = {"emission", "diffuse", "f0", "ior"}
@@ -106,6 +107,7 @@ def test_every_number_of_a_material_has_its_place(model):
             "sheen_color",
             "conductor_eta",
             "conductor_k",
+            "diffuse_transmission_color",
         )
         value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.0101 * i
         other = {"conductor_eta": "conductor_k", "conductor_k": "conductor_eta"}.get(name)  # either needs the other
@@ -116,6 +118,17 @@ def test_every_number_of_a_material_has_its_place(model):
         assert places == [MEMBERS.get((model, name), name)]
         seen.update(places)
     assert seen == {MEMBERS.get((model, name), name) for name in own}
+
+
+def test_what_passes_diffuse_light_is_a_thin_wall():
+    def packed(**members):
+        scene = {**document(), "materials": {"m": {"type": "principled", **members}}}
+        return pack_materials(parse_scene(scene))[0]
+
+    assert packed()["thin_walled"] == 0 and packed(transmission=1)["thin_walled"] == 0
+    assert packed(thin_walled=True)["thin_walled"] == 1
+    assert packed(diffuse_transmission=0.1)["thin_walled"] == 1
+    assert packed()["diffuse_transmission_color"][0] == layout.ABSENT
 
 
 def test_openpbr_shines_in_nits_and_its_tangents_are_angles():

@@ -8,11 +8,21 @@ vec4 base_exceeded(Surface s, vec4 albedo) {
 }
 
 vec4 base_albedo(Surface s, vec3 w) {
-    return base_exceeded(s, energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside));
+    vec4 albedo = energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+#if HAS_THIN_WALLS
+    return pane_albedo(s, w, base_exceeded(s, albedo));
+#else
+    return base_exceeded(s, albedo);
+#endif
 }
 
 vec4 base_albedo_mean(Surface s) {
-    return base_exceeded(s, energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside));
+    vec4 mean = energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+#if HAS_THIN_WALLS
+    return pane_albedo_mean(s, base_exceeded(s, mean));
+#else
+    return base_exceeded(s, mean);
+#endif
 }
 
 // The mean of base_dielectric seen from outside.
@@ -23,6 +33,12 @@ void base_side(bool behind, inout Surface s) {
 #if HAS_TRANSMISSION
     s.inside = behind && s.transmission > 0.0 && s.metallic < 1.0;
     s.eta = s.inside ? 1.0 / s.eta_outside : s.eta_outside;
+#if HAS_THIN_WALLS
+    if (s.is_thin) {
+        s.inside = false;
+        s.eta = 1.0;
+    }
+#endif
 #endif
 }
 
@@ -50,6 +66,10 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
     w.diffuse_below = 0.0;
     float specular = luminance(base_fresnel(s, wo.z));
 #if HAS_TRANSMISSION
+#if HAS_THIN_WALLS
+    if (s.is_thin) specular += luminance(pane_transmittance(s, pane_reflected(s, wo.z)));
+    else
+#endif
     specular += luminance(base_transmittance(s, wo.z));
     if (multiscatter_glass(s)) {
         float glass = (1.0 - s.metallic) * s.transmission;
@@ -74,10 +94,19 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
 #if HAS_TRANSMISSION
 // Of light that passes the base: f lacks the layers.
 Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BaseWeights w) {
+#if !HAS_THIN_WALLS
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
+#endif
     vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
     vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, albedo_i));
     float pdf = w.diffuse_below * INV_PI * -wi.z;
+#if HAS_THIN_WALLS
+    if (s.is_thin) {
+        Scatter through = pane_eval(s, wo_t, base_image(wi_t), albedo_i, w.specular);
+        return Scatter(f + LOBE(LOBE_TRANSMISSION, through.f), pdf + through.pdf);
+    }
+    if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
+#endif
     vec3 wm = base_half_vector(s, wo_t, wi_t);
     if (!s.is_delta && !s.index_matched) {
         pdf += w.specular * base_transmit_folded(s, wo_t, wi_t);

@@ -19,6 +19,9 @@ bool multiscatter_glass(Surface s) { return !s.index_matched; }
 // The chance that light lost between the facets of rough glass leaves on the other side. 1 - F of the two sides differ
 // by eta^2, and so must the light that they exchange: the lesser loss decides.
 float multiscatter_transmit_chance(Surface s) {
+#if HAS_THIN_WALLS
+    if (s.is_thin) return pane_multiscatter_chance(s);
+#endif
     float lost_a = s.albedo_mean.z, lost_b = s.albedo_mean.w;
     float t = (1.0 - mix(fresnel_mean(s.eta_outside), 1.0, s.excess)) * min(lost_a, lost_b);
     return s.inside ? t / max(sqr(s.eta_outside) * lost_b, 1e-9) : t / max(lost_a, 1e-9);

@@ -8,13 +8,20 @@ float base_dielectric(Surface s, float c, float eta) { return mix(fresnel_dielec
 
 vec3 base_fresnel(Surface s, float c) {
     vec3 clear = models_tinted(s, base_dielectric(s, c, s.eta_outside));
-#if HAS_TRANSMISSION
+#if HAS_THIN_WALLS
+    vec3 facets = s.is_thin ? pane_of(clear) : models_tinted(s, base_dielectric(s, c, s.eta));
+    clear = mix(clear, facets, s.transmission);
+#elif HAS_TRANSMISSION
     clear = mix(clear, models_tinted(s, base_dielectric(s, c, s.eta)), s.transmission);
 #endif
     return mix(clear, models_metal(s, c), s.metallic);
 }
 
 vec3 base_transmittance(Surface s, float c) {
+#if HAS_THIN_WALLS
+    float r = s.is_thin ? pane_of(base_dielectric(s, c, s.eta_outside)) : base_dielectric(s, c, s.eta);
+    return (1.0 - s.metallic) * s.transmission * (1.0 - r) * s.clear_color;
+#endif
     return (1.0 - s.metallic) * s.transmission * (1.0 - base_dielectric(s, c, s.eta)) * s.clear_color;
 }
 
@@ -22,6 +29,9 @@ vec3 base_transmittance(Surface s, float c) {
 float base_reflect_chance(Surface s, float c) {
 #if HAS_TRANSMISSION
     if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
+#if HAS_THIN_WALLS
+    if (s.is_thin) return pane_reflect_chance(s, c);
+#endif
     float r = luminance(base_fresnel(s, c)), t = luminance(base_transmittance(s, c));
     return t > 0.0 ? r / (r + t) : 1.0;
 #else
@@ -33,8 +43,16 @@ vec3 base_reflect(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     return base_fresnel(s, cos_d) * (ggx_d(wm, s.alpha) * ggx_visibility(wo, wi, s.alpha));
 }
 
+// The cosine that decides on the chance of reflecting: that at the facet, but for panes that of wo.
+float base_deciding(Surface s, vec3 wo, float cos_d) {
+#if HAS_THIN_WALLS
+    if (s.is_thin) return wo.z;
+#endif
+    return cos_d;
+}
+
 float base_reflect_pdf(Surface s, vec3 wo, vec3 wm, float cos_d) {
-    return ggx_visible_pdf(wo, wm, s.alpha) * base_reflect_chance(s, cos_d);
+    return ggx_visible_pdf(wo, wm, s.alpha) * base_reflect_chance(s, base_deciding(s, wo, cos_d));
 }
 
 #if HAS_TRANSMISSION
@@ -67,7 +85,12 @@ float base_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
 
 vec3 base_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
 
-bool base_folds(Surface s) { return s.transmission > 0.0 && s.metallic < 1.0; }
+bool base_folds(Surface s) {
+#if HAS_THIN_WALLS
+    if (s.is_thin) return false;
+#endif
+    return s.transmission > 0.0 && s.metallic < 1.0;
+}
 
 // The density of wi as the image of a direction on the wrong side of the surface.
 float base_reflect_folded(Surface s, vec3 wo, vec3 wi) {
@@ -90,8 +113,11 @@ vec3 base_sample(Surface s, vec3 wo, float v, vec2 u) {
     vec3 wm = s.is_delta ? vec3(0.0, 0.0, 1.0) : ggx_visible_normal(wo, s.alpha, u);
     float c = dot(wo, wm);
 #if HAS_TRANSMISSION
-    if (v >= base_reflect_chance(s, c)) {
+    if (v >= base_reflect_chance(s, base_deciding(s, wo, c))) {
         if (s.index_matched) return -wo;
+#if HAS_THIN_WALLS
+        if (s.is_thin) return pane_sample(s, wo, u);
+#endif
         float k = 1.0 / s.eta;
         float cos_t = sqrt(max(0.0, 1.0 - k * k * (1.0 - c * c)));
         vec3 refracted = (k * c - cos_t) * wm - k * wo;

@@ -18,6 +18,18 @@ vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, float albedo_o
     return (1.0 - s.metallic) * (1.0 - s.transmission) * INV_PI * f * s.base_color;
 }
 
+#if HAS_THIN_WALLS
+// Of light that the inside of a thin wall scatters to its other side, whose boundary it passes, too.
+vec3 principled_through_eval(Surface s, float albedo_o, float albedo_i, float albedo_mean) {
+    float f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * s.diffuse_transmission * INV_PI * f * s.diffuse_through;
+}
+
+float principled_through_weight(Surface s, float albedo_o) {
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.diffuse_through) * (1.0 - albedo_o);
+}
+#endif
+
 float principled_diffuse_weight(Surface s, float albedo_o) {
     return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.base_color) * (1.0 - albedo_o);
 }
