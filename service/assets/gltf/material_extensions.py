@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from service.assets.gltf.material_reader import MaterialReader
 
 DEFAULT_IOR, LARGEST_IOR = 1.5, 4.0
-COAT_F0 = 0.04  # reflectance head-on of principled's coat, whose index is 1.5
 
 
 def add(read: MaterialReader, document: dict[str, Any]) -> None:
@@ -29,7 +28,8 @@ def add(read: MaterialReader, document: dict[str, Any]) -> None:
     _clearcoat(read, document)
     if transmission is not None and clear:
         document["transmission"] = read.scalar(transmission, "transmissionTexture", through, "r")
-        _volume(read, document, ior)
+        _volume(read, document)
+    _diffuse_transmission(read, document)
 
 
 def normal_map(read: MaterialReader, owner: JsonView, name: str, parameter: str) -> dict[str, Any]:
@@ -166,30 +166,38 @@ def _clearcoat(read: MaterialReader, document: dict[str, Any]) -> None:
     document.update(normal_map(read, extension, "clearcoatNormalTexture", "clearcoat_normal_map"))
 
 
-def _volume(read: MaterialReader, document: dict[str, Any], ior: float) -> None:
+def _volume(read: MaterialReader, document: dict[str, Any]) -> None:
+    volume = _thick(read)
+    if volume is None:
+        document["thin_walled"] = True
+        return
+    if "thicknessTexture" in volume:
+        read.notes.add(
+            volume.at("thicknessTexture"),
+            "the thickness texture is not used; rays go through the geometry itself",
+        )
+    if "attenuationDistance" in volume:
+        document["attenuation_distance"] = volume.number("attenuationDistance", 1, 1e-9, 1e9)
+        document["attenuation_color"] = factor(read.share(volume, "attenuationColor", (1.0, 1.0, 1.0)))
+
+
+def _thick(read: MaterialReader) -> JsonView | None:
+    """The extension that makes the material a body; None for thin walls."""
     volume = read.place.extension("KHR_materials_volume")
-    if volume is not None and volume.number("thicknessFactor", 0, 0) > 0:
-        if "thicknessTexture" in volume:
-            read.notes.add(
-                volume.at("thicknessTexture"),
-                "the thickness texture is not used; rays go through the geometry itself",
-            )
-        if "attenuationDistance" in volume:
-            document["attenuation_distance"] = volume.number("attenuationDistance", 1, 1e-9, 1e9)
-            document["attenuation_color"] = factor(read.share(volume, "attenuationColor", (1.0, 1.0, 1.0)))
+    return volume if volume is not None and volume.number("thicknessFactor", 0, 0) > 0 else None
+
+
+def _diffuse_transmission(read: MaterialReader, document: dict[str, Any]) -> None:
+    extension = read.place.extension("KHR_materials_diffuse_transmission")
+    share = extension.number("diffuseTransmissionFactor", 0, 0, 1) if extension else 0.0
+    if extension is None or not share:
         return
-    # A thin wall bends nothing: an index of 1 lets light straight through, and a coat does the reflecting.
-    extension = read.place.extension("KHR_materials_transmission")
-    where = extension.pointer if extension else read.place.pointer
-    if document.get("roughness") != 0:
-        read.notes.add(where, "the roughness of a thin wall (one without thickness) does not blur what is behind it")
-    document["ior"] = 1.0
-    document.pop("specular", None)
-    if "clearcoat" in document:
-        read.notes.add(where, "a thin wall with a clearcoat reflects by the clearcoat alone")
-        return
-    f0 = ((ior - 1) / (ior + 1)) ** 2
-    document["clearcoat"] = min(f0 / COAT_F0, 1.0)
-    document["clearcoat_roughness"] = document["roughness"]
-    if "normal_map" in document:
-        document["clearcoat_normal_map"] = document["normal_map"]
+    if _thick(read) is not None:
+        if "transmission" in document:
+            read.notes.add(extension.pointer, "beside a body of glass diffuse transmission is left out")
+            return
+        read.notes.add(extension.pointer, "light does not travel inside the body; its surfaces are thin walls")
+    document["thin_walled"] = True
+    document["diffuse_transmission"] = read.scalar(extension, "diffuseTransmissionTexture", share, "a")
+    color = extension.color("diffuseTransmissionColorFactor", (1.0, 1.0, 1.0))
+    document["diffuse_transmission_color"] = read.color(extension, "diffuseTransmissionColorTexture", color)

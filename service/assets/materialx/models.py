@@ -28,18 +28,18 @@ from service.assets.materialx.trees import (
 COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
 COAT_TINT = "the colour of the coat tints what is under it, at all angles alike"
 DARKER = "the coat does not darken what is under it"
-ONE_SIDED = (
-    "a thin wall is shown as glass that bends nothing; its coat does the reflecting, and roughness does not blur"
-)
 
 
 def standard_surface(s: Surface) -> None:
     """Autodesk Standard Surface 1.0.1."""
     transmission, metalness = s.tree("transmission"), s.tree("metalness")
     base = times(s.tree("base_color"), s.tree("base"))
-    if s.is_used("subsurface", 0):
+    is_thin = _thin(s, "thin_walled")
+    if s.is_used("subsurface", 0) and is_thin:  # all that the library's own graph scatters goes through then
+        base = _translucent(s, base, s.tree("subsurface"), constant(0.0), "subsurface_color")
+    elif s.is_used("subsurface", 0):
         base = _subsurface(s, base, "subsurface", "subsurface_color")
-    base = _through(s, base, "transmission", "transmission_color", "transmission_depth")
+    base = _through(s, base, "transmission", "transmission_color", "transmission_depth", is_thin)
     base = _under_coat(s, base, "coat", "coat_color")
     s.put("base_color", "base_color", base)
     s.put("metallic", "metalness", metalness, 0.0)
@@ -52,7 +52,6 @@ def standard_surface(s: Surface) -> None:
     _emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission")
     s.put("alpha", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("normal_map", "normal")
-    _thin(s, "thin_walled")
     s.lose([
         ("diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
@@ -71,9 +70,14 @@ def open_pbr_surface(s: Surface) -> None:
     """OpenPBR Surface 1.1."""
     metalness = s.tree("base_metalness")
     base = times(s.tree("base_color"), s.tree("base_weight"))
-    if s.is_used("subsurface_weight", 0):
+    is_thin = _thin(s, "geometry_thin_walled")
+    if s.is_used("subsurface_weight", 0) and is_thin:
+        weight, forward = s.tree("subsurface_weight"), times(s.tree("subsurface_scatter_anisotropy"), 0.5)
+        through, back = added(constant(0.5), forward), added(constant(0.5), times(forward, -1.0))
+        base = _translucent(s, base, times(weight, through), times(weight, back), "subsurface_color")
+    elif s.is_used("subsurface_weight", 0):
         base = _subsurface(s, base, "subsurface_weight", "subsurface_color")
-    base = _through(s, base, "transmission_weight", "transmission_color", "transmission_depth")
+    base = _through(s, base, "transmission_weight", "transmission_color", "transmission_depth", is_thin)
     base = _under_coat(s, base, "coat_weight", "coat_color")
     s.put("base_color", "base_color", base)
     s.put("metallic", "base_metalness", metalness, 0.0)
@@ -91,7 +95,6 @@ def open_pbr_surface(s: Surface) -> None:
     _emission(s, light, "emission_luminance")
     s.put("alpha", "geometry_opacity", s.tree("geometry_opacity"), 1.0)
     s.normal("normal_map", "geometry_normal")
-    _thin(s, "geometry_thin_walled")
     s.lose([
         ("base_diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
@@ -127,7 +130,7 @@ def gltf_pbr(s: Surface) -> None:
             s.put("attenuation_distance", "attenuation_distance", constant(distance[0]))
             s.put("attenuation_color", "attenuation_color", s.tree("attenuation_color"))
         elif not s.is_used("thickness", 0):
-            _wall(s, "thickness")
+            s.material["thin_walled"] = True
     color = s.tree("sheen_color")
     if not s.is_black(color):
         _sheen(s, constant(1.0), color, s.tree("sheen_roughness"), "sheen_color")
@@ -296,11 +299,11 @@ def _subsurface(s: Surface, base: Tree, weight: str, color: str) -> Tree:
     return mixed(base, s.tree(color), s.tree(weight))
 
 
-def _through(s: Surface, base: Tree, weight: str, color: str, depth: str) -> Tree:
+def _through(s: Surface, base: Tree, weight: str, color: str, depth: str, is_thin: bool) -> Tree:
     """The colour of what light passes through: of the inside where it has a depth, else of the surface."""
     if not s.is_used(weight, 0):
         return base
-    distance = s.number(depth, 0.0)
+    distance = 0.0 if is_thin else s.number(depth, 0.0)
     if distance > 0:
         s.put("attenuation_distance", depth, constant(distance))
         s.put("attenuation_color", color, s.tree(color))
@@ -313,19 +316,21 @@ def _emission(s: Surface, light: Tree, name: str) -> None:
         s.put("emission", name, light)
 
 
-def _thin(s: Surface, name: str) -> None:
-    found = s.constant(name)
-    if found is not None and found[0] > 0 and s.material.get("transmission"):
-        _wall(s, name)
+def _thin(s: Surface, name: str) -> bool:
+    """Whether the surface is a thin wall, which the material then says."""
+    if not s.is_set(name):
+        return False
+    s.material["thin_walled"] = True
+    return True
 
 
-def _wall(s: Surface, name: str) -> None:
-    s.note(name, ONE_SIDED)
-    index = s.material.get("ior", 1.5)
-    s.material["ior"] = 1.0
-    if "clearcoat" not in s.material and not isinstance(index, dict):
-        s.material["clearcoat"] = min(((index - 1) / (index + 1)) ** 2 / COAT_F0, 1.0)
-        s.material["clearcoat_roughness"] = s.material.get("roughness", 0.5)
+def _translucent(s: Surface, base: Tree, share: Tree, reflected: Tree, color: str) -> Tree:
+    """The base colour of a thin wall, of whose diffuse light `share` goes through with a colour, while `reflected`
+    comes back with it."""
+    s.material["thin_walled"] = True
+    s.put("diffuse_transmission", color, share, 0.0)
+    s.put("diffuse_transmission_color", color, s.tree(color))
+    return mixed(base, s.tree(color), quotient(reflected, clamped(complement(share), 1e-6, 1.0)))
 
 
 def _metal_edges(s: Surface, metalness: Tree, name: str) -> None:

@@ -31,13 +31,18 @@ NEGLIGIBLE = 0.5  # a coat whose roughness is at most this share of the base's m
 
 
 def suits_open_pbr(s: Surface) -> bool:
-    """Whether `openpbr` loses less: it has all but the insides of bodies and walls without one."""
-    return not (s.is_used("transmission_weight", 0) and _has_body(s, "geometry_thin_walled"))
+    """Whether `openpbr` loses less: it lacks the insides of bodies, and the diffuse light that thin walls pass."""
+    if s.is_set("geometry_thin_walled"):
+        return not s.is_used("subsurface_weight", 0)
+    return not (s.is_used("transmission_weight", 0) and s.is_used("transmission_depth", 0))
 
 
 def suits_standard(s: Surface) -> bool:
     """Whether more is used that only `openpbr` has than what only `principled` has."""
-    if s.is_used("transmission", 0) and _has_body(s, "thin_walled"):
+    is_thin = s.is_set("thin_walled")
+    if is_thin and s.is_used("subsurface", 0):
+        return False
+    if not is_thin and s.is_used("transmission", 0) and s.is_used("transmission_depth", 0):
         return False
     gained = int(s.is_used("diffuse_roughness", 0)) + int(
         s.is_used("metalness", 0) and s.is_used("specular_color", 1)
@@ -63,6 +68,8 @@ def open_pbr_surface(s: Surface) -> None:
             s.note("subsurface_weight", BELOW)
             tree = mixed(tree, s.tree("subsurface_color"), s.tree("subsurface_weight"))
         s.put(name, name, tree, None if s.graphs.is_given(s.node, name) else default)
+    if s.is_set("geometry_thin_walled"):
+        s.material["geometry_thin_walled"] = True
     _emission(s, "emission_luminance", 1.0)
     s.normal("geometry_normal", "geometry_normal")
     s.normal("geometry_coat_normal", "geometry_coat_normal")
@@ -72,7 +79,6 @@ def open_pbr_surface(s: Surface) -> None:
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
         ("transmission_dispersion_scale", 0, DISPERSION),
         ("thin_film_weight", 0, FILM),
-        ("geometry_thin_walled", 0, "thin walls are not supported; the surface is that of a body"),
     ])  # fmt: skip
 
 
@@ -96,6 +102,8 @@ def standard_surface(s: Surface) -> None:
     if s.is_used("transmission", 0):
         _set(s, "transmission_weight", "transmission")
         _set(s, "transmission_color", "transmission_color")
+    if s.is_set("thin_walled"):
+        s.material["geometry_thin_walled"] = True
     if s.is_used("coat", 0):
         _coat(s)
     if s.is_used("sheen", 0):
@@ -111,12 +119,7 @@ def standard_surface(s: Surface) -> None:
         ("transmission_dispersion", 0, DISPERSION),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
         ("thin_film_thickness", 0, FILM),
-        ("thin_walled", 0, "thin walls are not supported; the surface is that of a body"),
     ])  # fmt: skip
-
-
-def _has_body(s: Surface, thin: str) -> bool:
-    return s.is_used("transmission_depth", 0) or s.is_used(thin, 0)
 
 
 def _set(s: Surface, parameter: str, name: str) -> None:

@@ -23,7 +23,7 @@ RANGES = {
 }  # fmt: skip
 COLORS = (
     "base_color", "attenuation_color", "specular_color", "sheen_color", "emission", "transmission_color",
-    "coat_color", "fuzz_color", "emission_color",
+    "coat_color", "fuzz_color", "emission_color", "diffuse_transmission_color",
 )  # fmt: skip
 NITS = 1 / 683  # watts of a lumen
 FILM = "thin films are not supported and are left out"
@@ -49,6 +49,11 @@ class Surface:
 
     def note(self, name: str, detail: str) -> None:
         self.graphs.notes.add(self.place(name), detail)
+
+    def is_set(self, name: str) -> bool:
+        """Whether a switch is on."""
+        found = self.constant(name)
+        return found is not None and found[0] > 0
 
     def constant(self, name: str) -> list[float] | None:
         """The value of an input that is the same everywhere; None for any other, and for one without a meaning."""

@@ -19,7 +19,8 @@ SPECULAR, SPECULAR_IOR = 0.5, 1.5  # principled's own reflectance head-on, and i
 WRITTEN = {
     "specular", "specular_color", "specular_tint", "ior", "transmission", "attenuation_color",
     "attenuation_distance", "sheen", "sheen_color", "sheen_tint", "sheen_roughness", "clearcoat", "clearcoat_gloss",
-    "clearcoat_roughness", "clearcoat_normal_map", "anisotropic", "anisotropic_rotation",
+    "clearcoat_roughness", "clearcoat_normal_map", "anisotropic", "anisotropic_rotation", "thin_walled",
+    "diffuse_transmission", "diffuse_transmission_color",
 }  # fmt: skip
 
 
@@ -27,7 +28,7 @@ def written(of: MaterialWriter) -> Tree:
     """The members of the material's `extensions`."""
     found: Tree = {}
     if of.material.metallic != 1:  # a metal shows nothing of these
-        found |= _specular(of) | _transmission(of) | _sheen(of)
+        found |= _specular(of) | _transmission(of) | _diffuse_transmission(of) | _sheen(of)
     return found | _clearcoat(of) | _anisotropy(of)
 
 
@@ -69,6 +70,8 @@ def _transmission(of: MaterialWriter) -> Tree:
     if factor == 0:
         return {}
     found = of.builder.extension("KHR_materials_transmission", _scalar(of, "transmission", factor, plane, 0))
+    if m.is_thin:  # without a volume it is that in glTF, too
+        return found
     volume: Tree = {"thicknessFactor": of.asked.thickness}
     color, distance = m.attenuation_color, m.attenuation_distance
     if distance is not None:
@@ -80,6 +83,21 @@ def _transmission(of: MaterialWriter) -> Tree:
         if shade != WHITE:
             volume["attenuationColor"] = [min(each, 1.0) for each in shade]
     return found | of.builder.extension("KHR_materials_volume", volume)
+
+
+def _diffuse_transmission(of: MaterialWriter) -> Tree:
+    m = of.material
+    share, plane = of.scalar(m.diffuse_transmission, "diffuse_transmission", ALPHA)
+    if share == 0:
+        return {}
+    found = _scalar(of, "diffuseTransmission", share, plane, ALPHA)
+    field = "base_color" if m.diffuse_transmission_color is None else "diffuse_transmission_color"
+    factor, planes = of.color(getattr(m, field), field)
+    if factor != WHITE:
+        found["diffuseTransmissionColorFactor"] = list(factor)
+    if (info := of.textures.info((*planes, None), is_srgb=True)) is not None:
+        found["diffuseTransmissionColorTexture"] = info
+    return of.builder.extension("KHR_materials_diffuse_transmission", found)
 
 
 def _sheen(of: MaterialWriter) -> Tree:

@@ -84,6 +84,9 @@ def _shines(material: AnySurface) -> bool:
 
 
 def _transmits(material: AnySurface) -> bool:
+    """Whether it is a body that light goes through; thin walls are none."""
+    if getattr(material, "is_thin", getattr(material, "geometry_thin_walled", False)):
+        return False
     found = getattr(material, "transmission", 0.0)
     return bool((found.factor if isinstance(found, ScalarTexture) else found) > 0)
 

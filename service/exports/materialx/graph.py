@@ -41,6 +41,10 @@ def number(value: float) -> Value:
     return Value("float", (value,))
 
 
+def switch(value: bool) -> Value:
+    return Value("boolean", (value,))
+
+
 def color(values: tuple[float, ...]) -> Value:
     return Value("color3", values)
 
@@ -244,7 +248,7 @@ class Graph:
 
 
 def input_of(name: str, value: Value) -> str:
-    text = ", ".join(f"{each:.9g}" for each in value.numbers)
+    text = ", ".join(str(each).lower() if value.type == "boolean" else f"{each:.9g}" for each in value.numbers)
     return f'<input name="{name}" type="{value.type}" value="{text}" />'
 
 

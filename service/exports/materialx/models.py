@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from service.exports.materialx.graph import WHITE, Graph, Value, color, number
+from service.exports.materialx.graph import WHITE, Graph, Value, color, number, switch
 from service.scene.material import OpenpbrMaterial, PrincipledMaterial
 from service.scene.material.principled import index_of_specular, roughness_of_gloss
 from service.scene.texture import ColorTexture, NormalTexture, ScalarTexture
@@ -24,6 +24,14 @@ def standard_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
         _dielectric(m, graph, made)
     if _is_used(m.transmission):
         _transmission(m, graph, made)
+    if m.is_thin:
+        made["thin_walled"] = switch(True)
+    if _is_used(m.diffuse_transmission):  # what the model scatters below a thin wall leaves on the other side
+        made["subsurface"] = graph.number(m.diffuse_transmission, "diffuse_transmission")
+        through = m.diffuse_transmission_color
+        made["subsurface_color"] = (
+            made["base_color"] if through is None else graph.color(through, "diffuse_transmission_color")
+        )
     made["specular_roughness"] = graph.number(m.roughness, "roughness")
     if _is_used(m.anisotropic):
         made["specular_anisotropy"] = _scaled(graph, m.anisotropic, "anisotropic", STRETCH)
@@ -54,6 +62,8 @@ def open_pbr_surface(m: OpenpbrMaterial, graph: Graph) -> Inputs:
             continue
         if name in ("geometry_tangent", "geometry_coat_tangent"):
             made[name] = graph.tangent(math.degrees(math.atan2(value[1], value[0])))
+        elif isinstance(value, bool):
+            made[name] = switch(value)
         elif isinstance(value, NormalTexture):
             map = graph.normal(value, name)
             made |= {name: map} if map is not None else {}
@@ -67,7 +77,7 @@ def open_pbr_surface(m: OpenpbrMaterial, graph: Graph) -> Inputs:
 
 def _transmission(m: PrincipledMaterial, graph: Graph, made: Inputs) -> None:
     made["transmission"] = graph.number(m.transmission, "transmission")
-    if m.attenuation_distance is None:
+    if m.attenuation_distance is None or m.is_thin:
         made["transmission_color"] = made["base_color"]
         return
     if isinstance(m.attenuation_distance, ScalarTexture):

@@ -65,6 +65,7 @@ def sound() -> Gltf:
         "transmission": {"transmissionFactor": 0.5, "transmissionTexture": info},
         "volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0, 0]},
         "ior": {"ior": 1.3},
+        "diffuse_transmission": {"diffuseTransmissionFactor": 0.5, "diffuseTransmissionTexture": info},
         "emissive_strength": {"emissiveStrength": 3},
     }
     rough = {"baseColorTexture": info, "metallicRoughnessTexture": info, "baseColorFactor": [1, 1, 1, 0.5]}

@@ -172,15 +172,27 @@ def test_glass_with_a_volume_refracts(store: AssetStore) -> None:
     assert made["attenuation_color"] == [0.5, 1, 1] and "clearcoat" not in made
 
 
-def test_a_thin_wall_bends_nothing_and_reflects(store: AssetStore) -> None:
+def test_transmission_without_a_volume_is_a_thin_wall(store: AssetStore) -> None:
     made = with_extension(
         store,
         "transmission",
         {"transmissionFactor": 0.9},
         pbrMetallicRoughness={"metallicFactor": 0, "roughnessFactor": 0},
     )
-    assert (made["transmission"], made["ior"]) == (0.9, 1)
-    assert made["clearcoat"] == pytest.approx(1) and made["clearcoat_roughness"] == 0
+    assert (made["transmission"], made["thin_walled"]) == (0.9, True)
+    assert not {"ior", "clearcoat"} & made.keys()
+
+
+def test_leaves_pass_diffuse_light(store: AssetStore) -> None:
+    name = "diffuse_transmission"
+    made = with_extension(store, name, {"diffuseTransmissionFactor": 0.4})
+    assert made["thin_walled"] is True and made["diffuse_transmission"] == 0.4
+    assert made["diffuse_transmission_color"] == 1, "the extension's own default, whatever the base colour is"
+    made = with_extension(
+        store, name, {"diffuseTransmissionFactor": 1, "diffuseTransmissionColorFactor": [0.5, 1, 0]}
+    )
+    assert made["diffuse_transmission_color"] == [0.5, 1, 0]
+    assert "thin_walled" not in with_extension(store, name, {"diffuseTransmissionColorFactor": [0.5, 1, 0]})
 
 
 def test_specular_sets_the_reflectance_head_on(store: AssetStore) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from service.assets import AssetStore
@@ -43,15 +44,15 @@ def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
     unsupported = [
         value("subsurface_weight", 0.5), value("subsurface_color", 0, "color3").replace('"0"', '"0, 0, 0"'),
         value("base_color", [0.8, 0.4, 0.2]), value("transmission_dispersion_scale", 1), value("thin_film_weight", 1),
-        value("geometry_thin_walled", "true", "boolean"), value("geometry_tangent", "1, 0, 0", "vector3"),
+        value("geometry_tangent", "1, 0, 0", "vector3"),
         value("transmission_scatter", [0.1, 0.2, 0.3]),
     ]  # fmt: skip
     imported = taken(store, mtlx(surface("open_pbr_surface", *unsupported)))
     assert material(imported) == {"type": "openpbr", "base_color": pytest.approx([0.4, 0.2, 0.1])}
     assert losses(imported) == {
         f"SM/{name}" for name in (
-            "subsurface_weight", "transmission_dispersion_scale", "thin_film_weight", "geometry_thin_walled",
-            "geometry_tangent", "transmission_scatter",
+            "subsurface_weight", "transmission_dispersion_scale", "thin_film_weight", "geometry_tangent",
+            "transmission_scatter",
         )
     }  # fmt: skip
 
@@ -74,3 +75,31 @@ def test_standard_surface_is_the_model_that_loses_less(store: AssetStore) -> Non
     assert not imported.warnings
     body = [value("transmission", 1), value("transmission_depth", 2)]
     assert material(taken(store, mtlx(surface("standard_surface", *coat, *body))))["type"] == "principled"
+
+
+def test_thin_walls(store: AssetStore) -> None:
+    """Panes are `openpbr`; of what scatters, the part that goes through is `principled`'s."""
+    wall, glass = value("geometry_thin_walled", "true", "boolean"), value("transmission_weight", 1)
+    depth = value("transmission_depth", 2)  # of an inside, which it has not
+    imported = taken(store, mtlx(surface("open_pbr_surface", wall, glass, depth)))
+    found = material(imported)
+    assert (found["type"], found["geometry_thin_walled"], found["transmission_weight"]) == ("openpbr", True, 1)
+    paper = [
+        value("base_color", [0.2, 0.2, 0.2]), value("subsurface_weight", 0.5),
+        value("subsurface_color", [0.9, 0.8, 0.6]), value("subsurface_scatter_anisotropy", 0.2),
+    ]  # fmt: skip
+    found = material(taken(store, mtlx(surface("open_pbr_surface", wall, *paper))))
+    assert found["type"] == "principled" and found["thin_walled"] is True and "subsurface" not in found
+    share = 0.5 * 0.5 * 1.2
+    assert found["diffuse_transmission"] == pytest.approx(share)
+    assert found["diffuse_transmission_color"] == pytest.approx([0.9, 0.8, 0.6])
+    # What comes back: half of it the base's, and of the other half 1/2 (1 - 0.2).
+    back = np.array([0.2, 0.2, 0.2]) * 0.5 + np.array([0.9, 0.8, 0.6]) * 0.5 * 0.4
+    np.testing.assert_allclose((1 - share) * np.array(found["base_color"]), back, rtol=1e-5)
+    leaf = [
+        value("subsurface", 0.4),
+        value("subsurface_color", [0.5, 0.8, 0.1]),
+        value("thin_walled", "true", "boolean"),
+    ]
+    found = material(taken(store, mtlx(surface("standard_surface", *leaf))))
+    assert (found["type"], found["diffuse_transmission"]) == ("principled", pytest.approx(0.4))

@@ -139,6 +139,27 @@ def test_a_scene_of_meshes_comes_back_to_the_bit(store: AssetStore, gpu: Rendere
     assert one.mean() > 0.1 and np.array_equal(one, other)
 
 
+def test_thin_walls_come_back_to_the_bit(store: AssetStore, gpu: Renderer) -> None:
+    pane = {
+        "type": "principled",
+        "base_color": [1, 0.5, 0.25],
+        "transmission": 1,
+        "thin_walled": True,
+        "roughness": 0.3,
+    }
+    leaf = {"type": "principled", "base_color": [0.25, 0.5, 0.125], "thin_walled": True, "diffuse_transmission": 0.5}
+    leaf |= {"diffuse_transmission_color": [0.5, 1, 0.25], "roughness": 0.5}
+    before = scene({**QUAD, "material": "pane"}, {**TENT, "material": "leaf"}, materials={"pane": pane, "leaf": leaf},
+                   lights=LIGHTS)  # fmt: skip
+    made = exported(before, store)
+    assert lost(made) == {}
+    after = again(made, store)
+    assert after["materials"]["leaf"]["diffuse_transmission_color"] == [0.5, 1, 0.25]
+    assert after["materials"]["pane"]["thin_walled"] is True
+    one, other = (pixels(gpu, each, store) for each in (before, after))
+    assert one.mean() > 0.1 and np.array_equal(one, other)
+
+
 def pixels(gpu: Renderer, document: dict[str, Any], store: AssetStore) -> np.ndarray:
     made = gpu.picture(gpu.load(pack(parse_scene(document), store).arrays), RenderSettings(width=24, height=24))
     made.trace(600.0, 2)

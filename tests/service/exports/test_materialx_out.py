@@ -36,6 +36,10 @@ GLASS = {
     "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125,
 }  # fmt: skip
 TINTED = {"type": "principled", "base_color": [0.2, 0.1, 0.9], "roughness": 0.2, "transmission": 1.0}
+PANE = {"type": "principled", "base_color": [0.9, 1.0, 0.8], "roughness": 0.3, "transmission": 1.0, "ior": 1.45,
+        "thin_walled": True}  # fmt: skip
+LEAF = {"type": "principled", "base_color": [0.2, 0.5, 0.1], "roughness": 0.4, "ior": 1.4, "thin_walled": True,
+        "diffuse_transmission": 0.4, "diffuse_transmission_color": [0.5, 0.8, 0.1]}  # fmt: skip
 OPENPBR = {
     "type": "openpbr", "base_weight": 0.9, "base_color": [0.5, 0.25, 0.75], "base_diffuse_roughness": 0.4,
     "base_metalness": 0.5, "specular_weight": 1.5, "specular_color": [0.9, 0.8, 0.7], "specular_roughness": 0.3,
@@ -44,7 +48,7 @@ OPENPBR = {
     "coat_roughness_anisotropy": 0.3, "coat_ior": 1.7, "coat_darkening": 0.75, "fuzz_weight": 0.2,
     "fuzz_color": [0.3, 0.2, 0.1], "fuzz_roughness": 0.6, "emission_luminance": 500.0,
     "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8, "geometry_tangent": [0.6, -0.8, 0.0],
-    "geometry_coat_tangent": [-1.0, 0.0, 0.0],
+    "geometry_coat_tangent": [-1.0, 0.0, 0.0], "geometry_thin_walled": True,
 }  # fmt: skip
 TEXTURES = {
     "coat": {"asset": "", "color_space": "srgb", "wrap": "mirror", "scale": [2.0, -4.0], "rotation": 30.0,
@@ -101,7 +105,9 @@ def same(found: Any, wanted: Any) -> None:
             assert found[name] == (value if isinstance(value, str) else pytest.approx(value, rel=2e-6)), name
 
 
-@pytest.mark.parametrize("material", [FULL, GLASS, TINTED, OPENPBR], ids=["all", "glass", "tinted", "openpbr"])
+@pytest.mark.parametrize(
+    "material", [FULL, GLASS, TINTED, PANE, LEAF, OPENPBR], ids=["all", "glass", "tinted", "pane", "leaf", "openpbr"]
+)
 def test_a_material_is_the_same_when_it_is_read_again(store: AssetStore, material: dict[str, Any]) -> None:
     exported = written(store, {"m": material})
     assert not list(exported.losses)
