@@ -17,7 +17,7 @@ HEAD = '''"""The scene's document as types: dicts whose members an editor and a 
 Written by generate.py from the service's schema; a test holds it to that.
 """
 
-from typing import Literal, Required, TypedDict  # evaluated now: else a TypedDict does not see what is required
+from typing import Any, Literal, Required, TypedDict  # evaluated now: else a TypedDict does not see what is required
 
 '''
 TYPES = {"number": "float", "integer": "int", "string": "str", "boolean": "bool", "null": "None"}

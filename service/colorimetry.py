@@ -52,6 +52,7 @@ _REC709_OF_XYZ = np.array(
         [0.0556434, -0.2040259, 1.0572252],
     ]
 )
+_RADIATION = 1.438776877e7  # nm K, the second constant
 SPAN = (420.0, 680.0)  # nm: what a spectrum must have for its colour to be known
 
 
@@ -64,3 +65,14 @@ def reflected_color(wavelengths: npt.NDArray[Any]) -> npt.NDArray[Any]:
     weights = shares @ lit @ _REC709_OF_XYZ.T
     out: npt.NDArray[Any] = weights / weights.sum(axis=0)
     return out
+
+
+def planck_color(kelvin: float) -> tuple[float, float, float]:
+    """The colour of a black body, linear Rec.709 of luminance 1: what the observer sees of Planck's law, without what
+    would be negative."""
+    fine = np.arange(_NANOMETRES[0], _NANOMETRES[-1] + 0.5, 1.0)
+    observer = np.stack([np.interp(fine, _NANOMETRES, each) for each in _OBSERVER.T], axis=1)
+    spectrum = fine**-5.0 / np.expm1(_RADIATION / (fine * kelvin))
+    rgb = np.maximum(_REC709_OF_XYZ @ (spectrum @ observer), 0)
+    r, g, b = rgb / (LUMINANCE @ rgb)
+    return float(r), float(g), float(b)

@@ -8,7 +8,8 @@ named           what a person can give a name
 base            the base of all models: strict, with hints for editors
 numbers         numbers with their ranges and units
 number_arrays   lists of numbers, checked in one go
-color           colours: linear, sRGB and radiometric
+color           colours: linear, sRGB, by temperature
+photometry      strengths in candela, lumen, lux and nit
 validation      what pydantic says, as errors with pointers
 error_location  a pointer into the document, from pydantic's
 text            JSON texts: parsed, weighed and bounded

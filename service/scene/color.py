@@ -1,5 +1,5 @@
-"""Colours: three linear Rec.709 numbers, one number for grey, or "#rrggbb" in sRGB. Validation gives linear
-triples."""
+"""Colours: three linear Rec.709 numbers, one number for grey, "#rrggbb" in sRGB, or the temperature of a radiator.
+Validation gives linear triples."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from service.colorimetry import decode_srgb
+from service.colorimetry import decode_srgb, planck_color
 from service.scene.base import refusal
 from service.scene.numbers import BRIGHTEST, check_number, described, is_number, vector_schema
 
 Color = tuple[float, float, float]
 HEX = "^#[0-9a-fA-F]{6}$"
-FORMS = 'a colour is [r, g, b] (linear), one number (grey) or "#rrggbb" (sRGB)'
+FORMS = 'a colour is [r, g, b] (linear), one number (grey), "#rrggbb" (sRGB) or {"kelvin": number}'
+COLDEST, HOTTEST = 1000.0, 40000.0  # K
 
 
 LINEAR_OF_BYTE = [float(decode_srgb(byte / 255)) for byte in range(256)]
@@ -30,6 +31,8 @@ def color(high: float) -> Callable[[Any], Color]:
         if is_number(value):
             grey = check_number(value, 0, high)
             return grey, grey, grey
+        if isinstance(value, dict):
+            return _from_temperature(value, high)
         if not isinstance(value, list | tuple):
             raise refusal(f"{FORMS}, not {described(value)}")
         if len(value) != 3:
@@ -47,9 +50,27 @@ def _from_hex(text: str) -> Color:
     return LINEAR_OF_BYTE[r], LINEAR_OF_BYTE[g], LINEAR_OF_BYTE[b]
 
 
-def _schema(high: float) -> WithJsonSchema:
+def _from_temperature(value: dict[str, Any], high: float) -> Color:
+    if value.keys() != {"kelvin"}:
+        raise refusal(f"{FORMS}, not another object")
+    kelvin = check_number(value["kelvin"], COLDEST, HOTTEST, "kelvin")
+    r, g, b = planck_color(kelvin)
+    if max(r, g, b) > high:
+        raise refusal(f"{kelvin:g} K of luminance 1 has {max(r, g, b):.3g} in a channel; at most {high:g} is allowed")
+    return r, g, b
+
+
+def color_schema(high: float) -> dict[str, Any]:
+    """The JSON Schema of a colour."""
     grey = {"type": "number", "minimum": 0, "maximum": high}
-    return WithJsonSchema({"anyOf": [vector_schema(0, high), grey, {"type": "string", "pattern": HEX}]})
+    kelvin = {"type": "number", "minimum": COLDEST, "maximum": HOTTEST}
+    warm = {"type": "object", "properties": {"kelvin": kelvin}, "required": ["kelvin"], "additionalProperties": False}
+    return {"anyOf": [vector_schema(0, high), grey, {"type": "string", "pattern": HEX}, warm]}
+
+
+def _schema(high: float) -> WithJsonSchema:
+    # No radiator of luminance 1 has all of its channels below 1.
+    return WithJsonSchema(color_schema(high) if high > 1 else {"anyOf": color_schema(high)["anyOf"][:-1]})
 
 
 Reflectance = Annotated[Color, PlainValidator(color(1)), _schema(1)]

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from service.scene.base import Model, hint, refusal
-from service.scene.color import Radiometric
 from service.scene.numbers import BRIGHTEST, Degrees, Factor, Fraction
+from service.scene.photometry import Radiance
 
 
 class _Surroundings(Model):
@@ -37,7 +37,7 @@ class ConstantEnvironment(_Surroundings):
 
     type: Literal["constant"]
     radiance: Annotated[
-        Radiometric,
+        Radiance,
         hint(
             "Radiance",
             "The same from everywhere: a white furnace, or the light of a closed overcast.",

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from service.scene.base import hint, refusal
-from service.scene.color import Radiometric
+from service.scene.color import Color
 from service.scene.named import Name, Named
 from service.scene.numbers import Direction, Point
+from service.scene.photometry import SPHERE, Flux, strength, strength_schema
 
+Intensity = Annotated[Color, PlainValidator(strength("candela", "lumen")), strength_schema("candela", "lumen")]
+Irradiance = Annotated[Color, PlainValidator(strength("lux")), strength_schema("lux")]
 HalfAngle = Annotated[float, Field(ge=0, le=90)]
 
 
@@ -24,7 +28,7 @@ class PointLight(_Light):
     type: Literal["point"]
     position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
     intensity: Annotated[
-        Radiometric,
+        Intensity,
         hint(
             "Intensity",
             "The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi).",
@@ -34,6 +38,12 @@ class PointLight(_Light):
         ),
     ]
 
+    @model_validator(mode="after")
+    def _shines_all_around(self) -> Self:
+        if isinstance(self.intensity, Flux):
+            object.__setattr__(self, "intensity", self.intensity.over(SPHERE))
+        return self
+
 
 class SpotLight(_Light):
     """A point that shines into a cone: full inside the inner angle, fading to nothing at the outer."""
@@ -42,7 +52,7 @@ class SpotLight(_Light):
     position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
     direction: Annotated[Direction, hint("Direction", "Where the beam points; any length.", unit="", widget="number")]
     intensity: Annotated[
-        Radiometric,
+        Intensity,
         hint("Intensity", "Along the beam: the irradiance it gives 1 m away.", unit="W/sr", widget="color", soft=100),
     ]
     inner_angle: Annotated[
@@ -66,6 +76,13 @@ class SpotLight(_Light):
         if self.inner_angle > self.outer_angle:
             told = f"must be at most outer_angle, which is {self.outer_angle!r}, not {self.inner_angle!r}"
             raise refusal(told, at="/inner_angle")
+        if isinstance(self.intensity, Flux):
+            inner, outer = (math.cos(math.radians(angle)) for angle in (self.inner_angle, self.outer_angle))
+            # Between the two cosines it fades along a curve that is symmetric about its middle.
+            beam = 2 * math.pi * (1 - (inner + outer) / 2)
+            if beam <= 0:
+                raise refusal("a beam without an angle has no flux: give candela", at="/intensity")
+            object.__setattr__(self, "intensity", self.intensity.over(beam))
         return self
 
 
@@ -77,7 +94,7 @@ class DirectionalLight(_Light):
         Direction, hint("Direction", "The way the light travels; any length.", unit="", widget="number")
     ]
     irradiance: Annotated[
-        Radiometric,
+        Irradiance,
         hint(
             "Irradiance",
             "On a surface that faces the light; the sun at noon gives about 1000.",

@@ -20,6 +20,7 @@ from service.scene.numbers import (
     described,
     vector_schema,
 )
+from service.scene.photometry import FORMS, Radiance
 from service.scene.procedural import Channel, NoiseTexture, RampTexture
 
 Vec2 = tuple[float, float]
@@ -146,7 +147,8 @@ VALUE_TAG, REFERENCE_TAG = "<value>", "<reference>"
 
 
 def form_of(value: Any) -> str:
-    return REFERENCE_TAG if isinstance(value, dict | _Reference) else VALUE_TAG
+    is_value = isinstance(value, dict) and not FORMS.isdisjoint(value)
+    return REFERENCE_TAG if isinstance(value, dict | _Reference) and not is_value else VALUE_TAG
 
 
 AnyFraction = Annotated[
@@ -166,6 +168,9 @@ AnyIndex = Annotated[
 ]
 AnyReflectance = Annotated[
     Annotated[Reflectance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
+]
+AnyRadiance = Annotated[
+    Annotated[Radiance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyRadiometric = Annotated[
     Annotated[Radiometric, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)

@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Page
 
 from service import displays, images
+from service.colorimetry import planck_color
 from service.scene.transform import Transform
 from tests.web.modules import call
 
@@ -381,3 +382,16 @@ def test_a_canvas_keeps_what_the_screen_shows(page: Page, gamut: str) -> None:
     assert found["srgb"] == [255, 0, 0, 255]
     assert (found["wide"][0] > 250) == (gamut == "p3")
     assert found["asked"] == {"p3": "display_p3", "srgb": "srgb"}[gamut]
+
+
+def test_temperatures_and_units_have_a_swatch(page: Page) -> None:
+    for kelvin in (1500, 2700, 6500, 20000):
+        assert np.allclose(call(page, "lib/color.js", "linear", {"kelvin": kelvin}), planck_color(kelvin), atol=0.02)
+    shown = call(page, "lib/color.js", "linear", {"candela": 683, "color": {"kelvin": 2700}})
+    assert np.allclose(shown, planck_color(2700), atol=0.02)
+    assert call(page, "lib/color.js", "measureWords", {"lumen": 800, "color": "#ff8800"}) == "800 lm"
+    assert call(page, "lib/color.js", "measureWords", [1, 1, 1]) is None
+    typed = call(page, "lib/color.js", "parseColor", "2700 K")
+    assert max(typed) == 1 and np.allclose(
+        np.divide(typed, typed[0]), np.divide(planck_color(2700), planck_color(2700)[0]), atol=0.02
+    )

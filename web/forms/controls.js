@@ -2,7 +2,7 @@
 // the hand moves and `commit` when it comes to rest. `undefined` stands for "as the server likes". `refuse`
 // says what was wrong with something written, `restore` goes back to the value there was.
 
-import { hex, linear, parseColor } from "../lib/color.js";
+import { hex, linear, measureWords, parseColor } from "../lib/color.js";
 import { element, isBeingEdited } from "../lib/dom.js";
 import { slideByTouch } from "../lib/sliding.js";
 import { neededIn, parseNumber, parseTriple } from "../lib/number.js";
@@ -309,7 +309,7 @@ function color(field, id, { input, commit, refuse, restore }) {
       const triple = parseTriple(text.value);
       if (known) input(known.map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
       else if (triple) input(triple);
-      else return refuse("Write #rrggbb, rgb(), hsl(), or three linear numbers such as 0.2 0.4 0.6.");
+      else return refuse("Write #rrggbb, rgb(), hsl(), 2700 K, or three linear numbers such as 0.2 0.4 0.6.");
       commit();
     },
   });
@@ -325,8 +325,10 @@ function color(field, id, { input, commit, refuse, restore }) {
     },
   });
   let isSet = true;
+  let words = null; // of a temperature, or a photometric strength
   const write = () => {
-    const shown = !isSet ? "" : isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+    const numbers = () => (isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint));
+    const shown = isSet ? (words ?? numbers()) : "";
     if (!isBeingEdited(text)) text.value = shown;
     mode.textContent = isLinear ? "lin" : "hex";
   };
@@ -347,6 +349,7 @@ function color(field, id, { input, commit, refuse, restore }) {
     element: power ? element("div", {}, row, power.element) : row,
     show(value) {
       isSet = (value ?? null) !== null;
+      words = measureWords(value);
       swatch.classList.toggle("unset", !isSet);
       const now = linear(value ?? 0);
       const most = Math.max(...now);

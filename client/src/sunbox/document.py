@@ -7,7 +7,7 @@
 Written by generate.py from the service's schema; a test holds it to that.
 """
 
-from typing import Literal, Required, TypedDict  # evaluated now: else a TypedDict does not see what is required
+from typing import Any, Literal, Required, TypedDict  # evaluated now: else a TypedDict does not see what is required
 
 
 class ColorTexture(TypedDict, total=False):
@@ -15,7 +15,7 @@ class ColorTexture(TypedDict, total=False):
 
     channel: Literal["r", "g", "b", "a"]
     """Read as a grey; without it, the colour."""
-    factor: list[float] | float | str
+    factor: list[float] | float | str | dict[str, Any]
     """Multiplies the decoded texture; the product keeps to the parameter's range. (0 to 1e+20, default [1.0, 1.0,
     1.0])"""
     texture: Required[str]
@@ -67,10 +67,10 @@ class BlinnPhongMaterial(TypedDict, total=False):
     """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
     shininess: Required[float | ScalarTexture]
     """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
-    ambient: list[float] | float | str | ColorTexture
+    ambient: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
     default [0.0, 0.0, 0.0])"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -125,9 +125,9 @@ class CheckerTexture(TypedDict, total=False):
     """Two colours by turns: the first where floor(u scale_u) + floor(v scale_v) is even."""
 
     type: Required[Literal["checker"]]
-    a: Required[list[float] | float | str]
+    a: Required[list[float] | float | str | dict[str, Any]]
     """Of the square at u = v = 0. (0 to 1e+20)"""
-    b: Required[list[float] | float | str]
+    b: Required[list[float] | float | str | dict[str, Any]]
     """Of its neighbours. (0 to 1e+20)"""
     scale: list[float]
     """How many squares along u and v. (default [8.0, 8.0])"""
@@ -137,7 +137,7 @@ class ConstantEnvironment(TypedDict, total=False):
     """The same radiance from every direction."""
 
     type: Required[Literal["constant"]]
-    radiance: Required[list[float] | float | str]
+    radiance: Required[list[float] | float | str | dict[str, Any]]
     """The same from everywhere: a white furnace, or the light of a closed overcast. (W/(m^2 sr), 0 to 1e+20)"""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
@@ -187,7 +187,7 @@ class DiffuseMaterial(TypedDict, total=False):
     type: Required[Literal["diffuse"]]
     albedo: Required[list[float] | float | str | ColorTexture]
     """Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04. (0 to 1)"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -208,7 +208,7 @@ class DirectionalLight(TypedDict, total=False):
     type: Required[Literal["directional"]]
     direction: Required[list[float]]
     """The way the light travels; any length."""
-    irradiance: Required[list[float] | float | str]
+    irradiance: Required[list[float] | float | str | dict[str, Any]]
     """On a surface that faces the light; the sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
     angular_diameter: float
     """0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays. (degrees, 0 to 90, default 0.0)"""
@@ -263,7 +263,7 @@ class DisneyMaterial(TypedDict, total=False):
     """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
     clearcoat_gloss: float | ScalarTexture
     """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -321,7 +321,7 @@ class MeasuredMaterial(TypedDict, total=False):
     type: Required[Literal["measured"]]
     asset: Required[str]
     """A MERL .binary or an RGL .bsdf file."""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -380,7 +380,7 @@ class MetalRoughMaterial(TypedDict, total=False):
     """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1)"""
     roughness: Required[float | ScalarTexture]
     """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1)"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -424,7 +424,7 @@ class MicrofacetMaterial(TypedDict, total=False):
     """The shape of the diffuse lobe. (default 'lambert')"""
     diffuse_roughness: float
     """Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it. (0 to 1, default 0.0)"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -444,9 +444,9 @@ class NoiseTexture(TypedDict, total=False):
     contrast n, kept to 0..1. Its three channels are the colour's; it has no alpha."""
 
     type: Required[Literal["noise"]]
-    a: list[float] | float | str
+    a: list[float] | float | str | dict[str, Any]
     """The colour or value where the noise is lowest. (0 to 1e+20, default [0.0, 0.0, 0.0])"""
-    b: list[float] | float | str
+    b: list[float] | float | str | dict[str, Any]
     """The colour or value where it is highest. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
     space: Literal["object", "uv"]
     """object: solid, in metres before the shape's transform; uv: along its texture coordinates. (default 'object')"""
@@ -520,7 +520,7 @@ class OpenpbrMaterial(TypedDict, total=False):
     emission_luminance: float
     """Luminance that leaves the front side, times the colour: above 0 the shape is an area light. (cd/m^2, 0 to
     1e+20, default 0.0)"""
-    emission_color: list[float] | float | str | ColorTexture
+    emission_color: list[float] | float | str | dict[str, Any] | ColorTexture
     """A factor on the emission. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
     emission_sides: Literal["front", "both"]
     """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
@@ -596,10 +596,10 @@ class PhongMaterial(TypedDict, total=False):
     """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
     shininess: Required[float | ScalarTexture]
     """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
-    ambient: list[float] | float | str | ColorTexture
+    ambient: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
     default [0.0, 0.0, 0.0])"""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -620,7 +620,7 @@ class PointLight(TypedDict, total=False):
     type: Required[Literal["point"]]
     position: Required[list[float]]
     """Where the light stands. (m)"""
-    intensity: Required[list[float] | float | str]
+    intensity: Required[list[float] | float | str | dict[str, Any]]
     """The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi). (W/sr, 0 to 1e+20)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
@@ -684,7 +684,7 @@ class PrincipledMaterial(TypedDict, total=False):
     """The metal's extinction coefficient, per channel, beside its index. (0 to 1e+09)"""
     clearcoat_normal_map: NormalTexture
     """The coat's own; without it the coat is smooth over whatever is under it."""
-    emission: list[float] | float | str | ColorTexture
+    emission: list[float] | float | str | dict[str, Any] | ColorTexture
     """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
     0.0, 0.0])"""
     emission_sides: Literal["front", "both"]
@@ -734,7 +734,7 @@ class RampStop(TypedDict, total=False):
 
     position: Required[float]
     """Along the ramp. (0 to 1)"""
-    color: Required[list[float] | float | str]
+    color: Required[list[float] | float | str | dict[str, Any]]
     """There, as a colour or a value. (0 to 1e+20)"""
 
 
@@ -808,7 +808,7 @@ class SpotLight(TypedDict, total=False):
     """Where the light stands. (m)"""
     direction: Required[list[float]]
     """Where the beam points; any length."""
-    intensity: Required[list[float] | float | str]
+    intensity: Required[list[float] | float | str | dict[str, Any]]
     """Along the beam: the irradiance it gives 1 m away. (W/sr, 0 to 1e+20)"""
     inner_angle: Required[float]
     """From the beam's axis to where the light begins to fade. (degrees, 0 to 90)"""

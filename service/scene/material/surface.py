@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, get_args
 
 from service.scene.base import OMITTABLE, Model, hint
-from service.scene.texture import AnyFraction, AnyRadiometric, HeightTexture, NormalTexture
+from service.scene.texture import AnyFraction, AnyRadiance, HeightTexture, NormalTexture
 
 Emission = Annotated[
-    AnyRadiometric,
+    AnyRadiance,
     hint(
         "Emission",
         "Radiance that leaves the front side: above 0 the shape is an area light.",

@@ -219,14 +219,43 @@ const lib_color = (() => {
 const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
 const toLinear = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
 const HEX = /^#?([0-9a-f]{6})$/i;
+const LUMINANCE=[0.2126,0.7152,0.0722];
+function planck(t){
+const u = (0.86012 + 1.5412e-4 * t + 1.2864e-7 * t * t) / (1 + 8.4242e-4 * t + 7.0815e-7 * t * t);
+const v = (0.3174 + 4.2281e-5 * t + 4.2048e-8 * t * t) / (1 - 2.8974e-5 * t + 1.6146e-7 * t * t);
+const [x, z] = [(1.5 * u) / v, (2 - 0.5 * u - 5 * v) / v];
+const color=[3.24 * x - 1.537 - 0.4985 * z,1.876 - 0.969 * x + 0.0416 * z,0.0556 * x - 0.204 + 1.057 * z];
+return ofLuminance(
+color.map((channel)=>Math.max(channel,0)),
+1,
+);
+}
+function ofLuminance(color,luminance){
+const own=color.reduce((sum,x,i)=>sum + LUMINANCE[i] * x,0);
+return color.map((x) => (x * luminance) / own);
+}
+const WORDS = { kelvin: "K", candela: "cd", lumen: "lm", lux: "lx", nit: "nt" };
+const unitOf=(color)=>Object.keys(WORDS).find((each)=>color?.[each] !==undefined);
+function measureWords(color){
+const unit=unitOf(color);
+return unit ? `${color[unit]} ${WORDS[unit]}` : null;
+}
 function linear(color){
 if (typeof color === "number") return [color, color, color];
+const unit=unitOf(color);
+if (unit === "kelvin") return planck(color.kelvin);
+if (unit) return ofLuminance(linear(color.color ?? 1), color[unit] / (unit === "lumen" ? 8583 : 683));
 if (typeof color !== "string") return color;
 const bits=parseInt(HEX.exec(color)[1],16);
 return [bits >> 16, (bits >> 8) & 255, bits & 255].map((byte) => toLinear(byte / 255));
 }
 function parseColor(text){
 const plain=text.trim();
+const kelvin = Number(/^(\d{4,5}) ?K$/i.exec(plain)?.[1]);
+if(kelvin>=1000&&kelvin<=40000){
+const warm=planck(kelvin);
+return warm.map((x) => x / Math.max(...warm));
+}
 const wanted = /^([0-9a-f]{3}|[0-9a-f]{6})$/i.test(plain) ? `#${plain}` : plain;
 const context = new OffscreenCanvas(1, 1).getContext("2d");
 const [found, other] = ["#000000", "#ffffff"].map((before) => {
@@ -245,7 +274,7 @@ Math.round(255 * toSrgb(Math.min(Math.max(x,0),1)))
 .padStart(2, "0"),
 )
 .join("");
-return { HEX, hex, linear, parseColor, toLinear, toSrgb };
+return { HEX, hex, linear, measureWords, parseColor, toLinear, toSrgb };
 })();
 const lib_sliding = (() => {
 const STILL=6;
@@ -437,7 +466,7 @@ return own ?{min:own[0],max:own[1]}:soft;
 return { endsOf, span };
 })();
 const forms_controls = (() => {
-const { hex, linear, parseColor } = lib_color;
+const { hex, linear, measureWords, parseColor } = lib_color;
 const { element, isBeingEdited } = lib_dom;
 const { slideByTouch } = lib_sliding;
 const { neededIn, parseNumber, parseTriple } = lib_number;
@@ -725,7 +754,7 @@ const known=parseColor(text.value);
 const triple=parseTriple(text.value);
 if(known)input(known.map((x)=>Number((x *(bright ? strength||1:1)).toPrecision(5))));
 else if(triple)input(triple);
-else return refuse("Write #rrggbb, rgb(), hsl(), or three linear numbers such as 0.2 0.4 0.6.");
+else return refuse("Write #rrggbb, rgb(), hsl(), 2700 K, or three linear numbers such as 0.2 0.4 0.6.");
 commit();
 },
 });
@@ -741,8 +770,10 @@ write();
 },
 });
 let isSet=true;
+let words=null;
 const write=()=>{
-const shown = !isSet ? "" : isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+const numbers = () => (isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint));
+const shown = isSet ? (words ?? numbers()) : "";
 if(!isBeingEdited(text))text.value=shown;
 mode.textContent = isLinear ? "lin" : "hex";
 };
@@ -762,6 +793,7 @@ return{
 element: power ? element("div", {}, row, power.element) : row,
 show(value){
 isSet=(value ?? null)!==null;
+words=measureWords(value);
 swatch.classList.toggle("unset", !isSet);
 const now=linear(value ?? 0);
 const most=Math.max(...now);
