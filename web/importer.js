@@ -1,6 +1,6 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
 // images textures, several of one set a material, as MaterialX does, glTF, USD and zipped OBJ a scene, .cube files the
-// table that the picture's colours go through, JSON what it says.
+// table that the picture's colours go through, measured reflection a material, JSON what it says.
 
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
@@ -17,7 +17,7 @@ import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
 
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
-const ORDER = ["json", "scene", "mesh", "light", "image", "table"]; // a texture comes after the mesh that it is for
+const ORDER = ["json", "scene", "mesh", "light", "image", "table", "measured"]; // a texture comes after the mesh that it is for
 
 const ACCEPT = accepted(ORDER);
 
@@ -109,6 +109,7 @@ export class Importer {
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
     if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
     if (kind === "table") this.#putTable(info, file);
+    else if (kind === "measured") await this.#takeMeasured(info, file, at);
     else if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
     else await this.#takeImage(info, file, at);
     return false;
@@ -141,6 +142,33 @@ export class Importer {
     const what = isOne ? `is the material ${materials[0].name}.` : `are ${materials.length} materials.`;
     this.messages.show("import", { title: `${file.name} ${what}`, list: [...lines, ...left] });
     return false;
+  }
+
+  async #takeMeasured(info, file, at) {
+    if (at !== null) await this.#aim(at, file);
+    await this.acts.putFile(info.kind, info.id);
+    const left = (info.warnings ?? []).map(warningText);
+    if (left.length) this.messages.show("import", { title: `${file.name} is odd.`, list: left });
+  }
+
+  // The id of a file of this kind that the person picks, or null.
+  async pick(kind) {
+    const [file] = await browse(accepted([kind]));
+    if (!file) return null;
+    try {
+      return (await this.upload(file)).id;
+    } catch (problem) {
+      this.#refuse(file, problem);
+      return null;
+    } finally {
+      this.messages.hide("upload");
+    }
+  }
+
+  // Another file of this kind for the material in hand.
+  async replace(kind) {
+    const id = await this.pick(kind);
+    if (id) this.acts.putFile(kind, id);
   }
 
   async #takeImage(info, file, at) {

@@ -38,6 +38,7 @@ def as_principled(material: Material, pointer: str, losses: Losses) -> Principle
 _HOW = {
     "diffuse": "diffuse is written as a rough surface without a highlight",
     "disney": "disney is written as principled, which gains no energy",
+    "measured": "measured is written as grey principled, as no other format has its file",
     "metal_rough": "metal_rough is written as principled, which puts back the energy that facets lose",
 }
 _READ = {

@@ -9,6 +9,7 @@ import { dressed } from "./dressing.js";
 import { exposed } from "./lighting.js";
 import { isFlat } from "./bounds.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
+import { filesFor, modelOfFile } from "./model-files.js";
 import { at, pointer, put } from "../lib/patch.js";
 import { blackMaterial, cameraModels, defaults, environmentModels, fields, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
@@ -48,13 +49,15 @@ export class Editor extends Store {
   conversions = new Conversions();
   selection = []; // things that are selected together, as the outline has them
 
-  // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true.
-  constructor({ schema, name, scene, complain, forgive, waits }) {
+  // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true;
+  // `askFile(kind)` promises the id of a file that the person picks, or null.
+  constructor({ schema, name, scene, complain, forgive, waits, askFile }) {
     super({ settings: {}, view: {}, ...picked(name, scene) });
     this.#schema = schema.scene;
     this.complain = complain;
     this.forgive = forgive;
     this.waits = waits;
+    this.askFile = askFile;
     this.plainMaterial = newMaterial(schema.scene);
     this.blackMaterial = blackMaterial(schema.scene);
     const cameras = Object.entries(cameraModels(schema.scene));
@@ -239,6 +242,13 @@ export class Editor extends Store {
     return this.#turn(this.materialPlace, type);
   }
 
+  // Makes the material in hand what a file of this kind says.
+  putFile(kind, id) {
+    const { type, name } = modelOfFile(this.#schema, kind);
+    if (this.material.type === type) this.edit(`${this.materialPlace}/${name}`, id);
+    else return this.#turn(this.materialPlace, type, { files: { [name]: id } });
+  }
+
   // Whether a material is being turned into another model.
   get isWaiting() {
     return this.#turning > 0;
@@ -246,7 +256,7 @@ export class Editor extends Store {
 
   // Turns the material at a place into another model, or gives it other values of its menus with what follows; the
   // result stands at `to`.
-  async #turn(place, type, { choose, to = place } = {}) {
+  async #turn(place, type, { choose, to = place, files } = {}) {
     const turn = ++this.#turns;
     const old = at(this.state, place);
     if (!old) return this.waits(); // it was deleted meanwhile
@@ -254,20 +264,26 @@ export class Editor extends Store {
     this.waits();
     try {
       const known = choose ? undefined : old.type === type ? old : this.#origins.of(place, old, type);
-      const made = known ?? (await this.conversions.to(old, type, choose));
+      const asked = known || choose ? {} : (files ?? (await filesFor(this.#schema, type, this.askFile)));
+      if (!asked) return this.#stay(turn);
+      const made = known ?? (await this.conversions.to(old, type, { ...choose, ...asked }));
       if (turn !== this.#turns) return; // another one was picked meanwhile
       this.#turning = 0;
       const now = at(this.state, place);
-      if (now !== old) return this.#turn(place, type, { choose, to }); // edited meanwhile
+      if (now !== old) return this.#turn(place, type, { choose, to, files: asked }); // edited meanwhile
       if (choose) return this.edit(to, made);
       this.#origins.keep(to, old, made);
       this.change(put(this.state, to, made));
     } catch (problem) {
-      if (turn !== this.#turns) return;
-      this.#turning = 0;
-      this.complain(problem);
-      this.amend({}); // the pickers go back to what there is
+      if (turn === this.#turns) this.complain(problem);
+      this.#stay(turn);
     }
+  }
+
+  #stay(turn) {
+    if (turn !== this.#turns) return;
+    this.#turning = 0;
+    this.amend({}); // the pickers go back to what there is
   }
 
   // --- two variants ---

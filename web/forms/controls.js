@@ -364,6 +364,17 @@ function color(field, id, { input, commit, refuse, restore }) {
   };
 }
 
+// A file that the document names by an asset's id; `pick` has the person choose another one.
+function fileEntry(id, { pick }) {
+  const button = element("button", { type: "button", id, onclick: () => pick() }, "Choose a file…");
+  return {
+    element: button,
+    show(value) {
+      button.textContent = value ? "Another file…" : "Choose a file…";
+    },
+  };
+}
+
 const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
 
 export function control(field, id, events) {
@@ -371,6 +382,7 @@ export function control(field, id, events) {
   if (field.widget === "strength") return strengthControl(field, id, events);
   if (field.widget === "vector") return vector(field, id, events);
   if (field.widget === "texture") return { element: element("span", { id }), show() {} }; // its slot is all there is
+  if (field.widget === "file") return fileEntry(id, events);
   if (field.widget === "choice") return choice(field, id, events);
   if (field.widget === "toggle") return toggle(field, id, events);
   if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);

@@ -18,7 +18,7 @@ const isSame = ({ widget }, a, b) =>
 
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 
-function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
+function row(field, { change, commit, forgive, takeFile, pickFile, slot, beneath }) {
   const id = freshId(field.name);
   const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
   const mark = (text) => {
@@ -38,6 +38,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
       change(field.name, value);
     },
     commit,
+    pick: () => pickFile?.(field),
     refuse: mark,
     restore: () => {
       mark(null);
@@ -101,7 +102,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
 
 // Calls `change(name, value)` with each new value (undefined: the default again), `commit()` when the
 // hand comes to rest, `forgive()` when something refused is taken back by hand, `takeFile(name, file)` when an
-// image is dropped onto a field that takes textures; `slot(field, remove)` may make the TextureSlot of such a field,
+// image is dropped onto a field that takes textures, `pickFile(field)` where the person wants another file; `slot(field, remove)` may make the TextureSlot of such a field,
 // and `beneath(field)` {element, show} for what it has to say of its image.
 export function schemaForm(fields, acts) {
   const rows = new Map(fields.map((field) => [field.name, row(field, acts)]));

@@ -64,6 +64,7 @@ export class Panel {
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.stage.takeTexture(`${place}/${name}`, file),
+      pickFile: ({ file }) => this.stage.replaceFile(file),
       slot: (field, remove) =>
         new TextureSlot(field, { ...this.textureActs(`${place}/${field.name}`, field), remove }),
       beneath: (field) => {

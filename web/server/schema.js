@@ -96,7 +96,8 @@ function field(schema, name, raw, required) {
   const min = bound(limits, "minimum") ?? open.min;
   const max = bound(limits, "maximum") ?? open.max;
   const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
-  const widget = color
+  const file = bound(nodes, "x-asset");
+  const usual = color
     ? "color"
     : vector
       ? "vector"
@@ -109,10 +110,12 @@ function field(schema, name, raw, required) {
             : reference
               ? "texture"
               : null;
+  const widget = file ? "file" : usual;
   if (!widget || bound(nodes, "const") !== undefined) return null;
   return {
     name,
     widget,
+    file,
     choices,
     min,
     max,

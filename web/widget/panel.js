@@ -19,8 +19,8 @@ function slot() {
   };
 }
 
-// Fields that only show images have nothing to slide.
-const isSlid = ({ widget }) => widget !== "texture";
+// Fields that only name images or other files have nothing to slide.
+const isSlid = ({ widget }) => !["texture", "file"].includes(widget);
 
 // A menu that does something and then shows its name again.
 function menu(title, entries, act) {

@@ -152,7 +152,8 @@ const open = { min: bound(limits, "exclusiveMinimum"), max: bound(limits, "exclu
 const min = bound(limits, "minimum") ?? open.min;
 const max = bound(limits, "maximum") ?? open.max;
 const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
-const widget=color
+const file = bound(nodes, "x-asset");
+const usual=color
 ? "color"
 :vector
 ? "vector"
@@ -165,10 +166,12 @@ const widget=color
 :reference
 ? "texture"
 :null;
+const widget = file ? "file" : usual;
 if (!widget || bound(nodes, "const") !== undefined) return null;
 return{
 name,
 widget,
+file,
 choices,
 min,
 max,
@@ -807,12 +810,22 @@ write();
 },
 };
 }
+function fileEntry(id,{pick}){
+const button = element("button", { type: "button", id, onclick: () => pick() }, "Choose a file…");
+return{
+element:button,
+show(value){
+button.textContent = value ? "Another file…" : "Choose a file…";
+},
+};
+}
 const bounded=({soft})=>Number.isFinite(soft.max - soft.min);
 function control(field,id,events){
 if (field.widget === "color") return color(field, id, events);
 if (field.widget === "strength") return strengthControl(field, id, events);
 if (field.widget === "vector") return vector(field, id, events);
 if (field.widget === "texture") return { element: element("span", { id }), show() {} };
+if (field.widget === "file") return fileEntry(id, events);
 if (field.widget === "choice") return choice(field, id, events);
 if (field.widget === "toggle") return toggle(field, id, events);
 if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
@@ -975,7 +988,7 @@ const { unitText } = lib_format_text;
 const isSame=({widget},a,b)=>
 widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
 const isTexture=(value)=>isObject(value)&&value.texture !==undefined;
-function row(field,{change,commit,forgive,takeFile,slot,beneath}){
+function row(field,{change,commit,forgive,takeFile,pickFile,slot,beneath}){
 const id=freshId(field.name);
 const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
 const mark=(text)=>{
@@ -995,6 +1008,7 @@ mark(null);
 change(field.name,value);
 },
 commit,
+pick:()=>pickFile?.(field),
 refuse:mark,
 restore:()=>{
 mark(null);
@@ -1100,7 +1114,7 @@ if(!chip.hidden)chip.textContent=value.texture;
 },
 };
 }
-const isSlid = ({ widget }) => widget !== "texture";
+const isSlid = ({ widget }) => !["texture", "file"].includes(widget);
 function menu(title,entries,act){
 const select=element(
 "select",
