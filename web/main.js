@@ -74,7 +74,15 @@ const { schema, library, name, scene, left } = await boot({
 });
 learnNames(modelNames(schema.scene));
 titles = fieldTitles(schema.scene, schema.settings, schema.view);
-editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal"), waits: tellState, askFile: (kind) => later.importer.calls("pick")(kind) });
+editor = new Editor({
+  schema,
+  name,
+  scene,
+  complain,
+  forgive: () => messages.hide("refusal"),
+  waits: tellState,
+  askFile: (kind) => later.importer.calls("pick")(kind),
+});
 if (left) editor.amend(left.state);
 const page = new PageState({ schema, editor, ui, root, fit: (box) => later.comparison.now?.fit(box) ?? box });
 
