@@ -17,7 +17,7 @@ import { pictured } from "./document/textures.js";
 import { inWords } from "./lib/format-text.js";
 
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
-const ORDER = ["json", "scene", "mesh", "light", "image", "table", "measured"]; // a texture comes after the mesh that it is for
+const ORDER = ["json", "scene", "mesh", "light", "image", "table", "measurement"]; // a texture comes after the mesh that it is for
 
 const ACCEPT = accepted(ORDER);
 
@@ -109,7 +109,7 @@ export class Importer {
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
     if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
     if (kind === "table") this.#putTable(info, file);
-    else if (kind === "measured") await this.#takeMeasured(info, file, at);
+    else if (kind === "measurement") await this.#takeMeasured(info, file, at);
     else if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
     else await this.#takeImage(info, file, at);
     return false;
@@ -151,9 +151,9 @@ export class Importer {
     if (left.length) this.messages.show("import", { title: `${file.name} is odd.`, list: left });
   }
 
-  // The id of a file of this kind that the person picks, or null.
-  async pick(kind) {
-    const [file] = await browse(accepted([kind]));
+  // The id of a file that the person picks, or null; its name has one of these endings.
+  async pick({ endings }) {
+    const [file] = await browse(endings.join(","));
     if (!file) return null;
     try {
       return (await this.upload(file)).id;
@@ -165,10 +165,10 @@ export class Importer {
     }
   }
 
-  // Another file of this kind for the material in hand.
-  async replace(kind) {
-    const id = await this.pick(kind);
-    if (id) this.acts.putFile(kind, id);
+  // Another file, {kind, endings}, for the material in hand.
+  async replace(wanted) {
+    const id = await this.pick(wanted);
+    if (id) this.acts.putFile(wanted.kind, id);
   }
 
   async #takeImage(info, file, at) {

@@ -81,7 +81,7 @@ editor = new Editor({
   complain,
   forgive: () => messages.hide("refusal"),
   waits: tellState,
-  askFile: (kind) => later.importer.calls("pick")(kind),
+  askFile: (wanted) => later.importer.calls("pick")(wanted),
 });
 if (left) editor.amend(left.state);
 const page = new PageState({ schema, editor, ui, root, fit: (box) => later.comparison.now?.fit(box) ?? box });

@@ -68,7 +68,7 @@ def hint(
     highlight: tuple[Width, str | None] | None = None,
     new: dict[str, str] | None = None,
     known_as: str | None = None,
-    asset: str | None = None,
+    asset: tuple[str, tuple[str, ...]] | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -79,7 +79,8 @@ def hint(
     the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is
     the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
     is what the editor begins an entry of a table with. `known_as` is the name that other models have for the
-    parameter. `asset` is the kind of the file that a reference leads to, where the editor lets choose one.
+    parameter. `asset` is the kind of the file that a reference leads to, with the endings of such files' names, where
+    the editor lets choose one.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -115,7 +116,8 @@ def hint(
     if known_as is not None:
         extra["x-known-as"] = known_as
     if asset is not None:
-        extra["x-asset"] = asset
+        kind, endings = asset
+        extra["x-asset"] = {"kind": kind, "endings": list(endings)}
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

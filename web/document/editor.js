@@ -50,7 +50,7 @@ export class Editor extends Store {
   selection = []; // things that are selected together, as the outline has them
 
   // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true;
-  // `askFile(kind)` promises the id of a file that the person picks, or null.
+  // `askFile({kind, endings})` promises the id of a file that the person picks, or null.
   constructor({ schema, name, scene, complain, forgive, waits, askFile }) {
     super({ settings: {}, view: {}, ...picked(name, scene) });
     this.#schema = schema.scene;

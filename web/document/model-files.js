@@ -7,7 +7,7 @@ const fileField = (schema, type) =>
   fields(schema, materialModels(schema)[type]).find(({ widget, required }) => widget === "file" && required);
 
 // What a model needs of files by its parameters' names: {} where nothing, null where the person has none.
-// `ask(kind)` promises the id of a file, or null.
+// `ask({kind, endings})` promises the id of a file, or null.
 export async function filesFor(schema, type, ask) {
   const field = fileField(schema, type);
   if (!field) return {};
@@ -18,6 +18,6 @@ export async function filesFor(schema, type, ask) {
 // What a file of this kind makes of a material: {type, name}, the model and its parameter.
 export function modelOfFile(schema, kind) {
   const types = Object.keys(materialModels(schema));
-  const type = types.find((each) => fileField(schema, each)?.file === kind);
+  const type = types.find((each) => fileField(schema, each)?.file.kind === kind);
   return { type, name: fileField(schema, type).name };
 }

@@ -21,13 +21,13 @@ const KINDS = {
   jpeg: "image",
   webp: "image",
   cube: "table",
-  binary: "measured",
-  bsdf: "measured",
+  binary: "measurement",
+  bsdf: "measurement",
   json: "json",
   sunbox: "json",
 };
 
-// What a file is by its ending: scene, mesh, light, image, table, measured or json; undefined for others.
+// What a file is by its ending: scene, mesh, light, image, table, measurement or json; undefined for others.
 export const kindOf = (file) => KINDS[file.name.split(".").at(-1).toLowerCase()];
 
 // The endings of files of these kinds, as a file picker takes them.

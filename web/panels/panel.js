@@ -22,7 +22,7 @@ export class Panel {
   #made = null; // what the material's form was made for
 
   // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing), takeTexture(place, file),
-  // takeTable(file) and replaceFile(kind);
+  // takeTable(file) and replaceFile({kind, endings});
   // `paint(image, material)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
   // them.
   constructor(find, { schema, library, acts, stage, paint, say, textureActs }) {

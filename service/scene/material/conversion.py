@@ -64,7 +64,7 @@ class Parameter:
     def file_kind(self) -> str | None:
         """The kind of the file that it refers to, where it refers to one."""
         found = self.hints.get("x-asset")
-        return None if found is None else str(found)
+        return None if found is None else str(found["kind"])
 
     @property
     def middle(self) -> float:

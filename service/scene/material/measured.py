@@ -21,5 +21,10 @@ class MeasuredMaterial(Surface):
     asset: Annotated[
         str,
         Field(min_length=1),
-        hint("Measurement", "A MERL .binary or an RGL .bsdf file.", group="Base", asset="measured"),
+        hint(
+            "Measurement",
+            "A MERL .binary or an RGL .bsdf file.",
+            group="Base",
+            asset=("measured", (".binary", ".bsdf")),
+        ),
     ]
