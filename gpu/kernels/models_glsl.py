@@ -12,7 +12,9 @@ and where the row in `gpu/layout/models.py` says so:
     NAME_coat_eval(s, wo, wi)                  `has_coat_normals`: the Scatter of the coat alone, with the cosine
     NAME_deltas(s, wo, deltas)                 `may_be_delta`: its perfectly specular lobes
     NAME_delta_chance(s, wo)                   `may_be_delta`: the chance that NAME_sample picks one of them
-    NAME_sample_delta(wo, behind, u_lobe, s)   `may_be_delta`: a LobeSample where it has no other lobes
+    NAME_sample_delta(wo, behind, u_lobe, least, s)
+                                               `may_be_delta`: a LobeSample where it has no other lobes, each picked
+                                               with a chance of at least `least`
     NAME_terms(s, wo, wi, wm)                  `has_terms`: the Terms for a facet's normal wm
     NAME_metal(s, c), NAME_metal_mean(s)       `needs_tables`: the metal's reflectance at cosine c, and its mean
     NAME_tinted(s, f)                          `needs_tables`: the dielectric's reflectance f with the model's colour
@@ -67,9 +69,10 @@ def text() -> str:
                     "", _lobes(deltas, "{}_deltas(s, wo, deltas);")),
         _dispatcher("float models_delta_chance(Surface s, vec3 wo)",
                     "float r = 0.0;", _lobes(deltas, "r = {}_delta_chance(s, wo);")),
-        _dispatcher("LobeSample models_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s)",
+        _dispatcher("LobeSample models_sample_delta(vec3 wo, bool behind, float u_lobe, float least, "
+                    "inout Surface s)",
                     "LobeSample r = bsdf_rough_sample(vec3(0.0));",
-                    _only(deltas, "r = {}_sample_delta(wo, behind, u_lobe, s);")),
+                    _only(deltas, "r = {}_sample_delta(wo, behind, u_lobe, least, s);")),
         _dispatcher("Terms models_terms(Surface s, vec3 wo, vec3 wi, vec3 wm)",
                     "Terms r = Terms(vec3(0.0), 0.0, 0.0, true);",
                     _ladder(_with("has_terms"), "r = {}_terms(s, wo, wi, wm);")),

@@ -65,12 +65,8 @@ vec3 surface_attenuation(Material m) {
 void surface_roughen(float base, float coat, inout Material m) {
     float more = 2.0 * base;
     m.roughness = more > 0.0 ? min(sqrt(sqrt(sqr(sqr(m.roughness)) + more)), 1.0) : m.roughness;
-#if HAS_MICROFACET
     m.alpha = more > 0.0 ? sqrt(sqr(m.alpha) + more) : m.alpha;
-#endif
-#if HAS_PHONG || HAS_BLINN_PHONG
     m.shininess = more > 0.0 ? max(2.0 / (2.0 / (m.shininess + 2.0) + more) - 2.0, 0.0) : m.shininess;
-#endif
 #if HAS_CLEARCOAT
     if (coat > 0.0) {
         float gloss = sqrt(sqr(mix(0.1, 0.001, m.clearcoat_gloss)) + 2.0 * coat);

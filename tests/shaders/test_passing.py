@@ -155,3 +155,17 @@ def test_a_lamp_of_half_alpha_gives_half_the_light(gpu: Renderer, estimator: str
         for alpha in (1, 0.5)
     )
     np.testing.assert_allclose(half[:3], full[:3] / 2, rtol=0.02)
+
+
+def test_a_lamp_in_clear_glass_is_found_by_every_third_path(gpu: Renderer) -> None:
+    """Seen head-on, glass reflects 4 %: by that chance alone a small lamp in it would be a cluster of white dots."""
+    glass = {"type": "principled", "transmission": 1, "ior": 1.5, "roughness": 0, "base_color": 1}
+    pane = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "glass"}
+    lamp = {"type": "quad", "origin": [-9, -9, 8], "u": [0, 18, 0], "v": [18, 0, 0], "material": "lamp"}
+    materials = {"glass": glass, "lamp": {"type": "diffuse", "albedo": 0, "emission": 25}}
+    scene = document([pane, lamp], materials, camera={"position": [0, 0, 4], "target": [0, 0, 0], "vfov": 5})
+    one = render(gpu, scene, 1, width=128, height=128, max_bounces=4)[..., 0]
+    assert (one > 0).mean() == pytest.approx(1 / 3, abs=0.02)
+    assert one.mean() == pytest.approx(0.04 * 25, rel=0.05)
+    many = render(gpu, scene, 64, width=32, height=32, max_bounces=4)[..., 0]
+    assert many.mean() == pytest.approx(0.04 * 25, rel=0.005)

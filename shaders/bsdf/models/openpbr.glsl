@@ -297,9 +297,9 @@ float openpbr_delta_chance(Surface s, vec3 wo) {
 }
 
 // What openpbr_sample gives for a surface that only mirrors or refracts, without the work for other lobes.
-LobeSample openpbr_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
+LobeSample openpbr_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     s.bare = openpbr_is_bare(s, behind);
-    return base_sample_delta(wo, behind != s.turned_out, u_lobe, s);
+    return base_sample_delta(wo, behind != s.turned_out, u_lobe, least, s);
 }
 
 // The perfectly specular lobes, each as openpbr_sample gives it; those that the surface lacks are left alone.

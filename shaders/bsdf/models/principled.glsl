@@ -299,8 +299,8 @@ float principled_delta_chance(Surface s, vec3 wo) {
 }
 
 // What principled_sample gives for a surface that only mirrors or refracts, without the work for other lobes.
-LobeSample principled_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
-    return base_sample_delta(wo, behind, u_lobe, s);
+LobeSample principled_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
+    return base_sample_delta(wo, behind, u_lobe, least, s);
 }
 
 // The perfectly specular lobes, each as principled_sample gives it; those that the surface lacks are left alone.

@@ -159,12 +159,15 @@ LobeSample base_sample_facet(Surface s, vec3 wo, float v, vec2 u, float weight) 
     return r;
 }
 
-// A surface without other lobes, which only mirrors or refracts; u_lobe picks one of the two. Sets the members that
-// path_extend reads.
-LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, inout Surface s) {
+// A surface without other lobes, which only mirrors or refracts; u_lobe picks one of the two, where there are both each
+// with a chance of at least `least`. Sets the members that path_extend reads.
+LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     base_side(behind, s);
     float chance = base_reflect_chance(s, wo.z);
-    vec3 wi = base_sample(s, wo, u_lobe, vec2(0.0));
+#if HAS_TRANSMISSION
+    if (chance > 0.0 && chance < 1.0) chance = clamp(chance, least, 1.0 - least);
+#endif
+    vec3 wi = base_sample(s, wo, u_lobe < chance ? 0.0 : 1.0, vec2(0.0));
     Scatter scatter = Scatter(base_fresnel(s, wo.z), chance);
 #if HAS_TRANSMISSION
     if (u_lobe >= chance) scatter = Scatter(base_transmittance(s, wo.z), 1.0 - chance);
