@@ -179,3 +179,9 @@ def test_principled_and_openpbr_say_the_same_in_other_words() -> None:
         name: value for name, value in old.items() if name != "attenuation_distance"
     }
     assert asked({"type": "openpbr", "coat_weight": 1, "coat_color": 0.2}, "principled")[1] == ["coat_color"]
+
+
+def test_thin_walls_stay_thin() -> None:
+    made = converted({"type": "principled", "thin_walled": True, "transmission": 1}, "openpbr")
+    assert made["geometry_thin_walled"] is True
+    assert converted(made, "principled")["thin_walled"] is True
