@@ -164,7 +164,9 @@ def _with_geometry(arrays: SceneArrays, built: Geometry) -> SceneArrays:
         ellipsoids=built.shapes[ShapeKind.ELLIPSOID],
         triangles=built.shapes[ShapeKind.TRIANGLE],
         triangle_normals=built.triangle_normals,
-        tangents=built.tangents,
+        # Of what was measured only the file says whether it looks the same from all sides.
+        tangents=built.tangents
+        and (arrays.textures is not None or bool((arrays.materials["anisotropic"] > 0).any())),
         triangle_uvs=built.triangle_uvs,
         triangle_uvs_1=built.triangle_uvs_1,
         triangle_colors=built.triangle_colors,

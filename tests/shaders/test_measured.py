@@ -142,3 +142,16 @@ def test_samples_follow_their_pdf_and_carry_the_albedo(prober: Prober, row: str,
     on_grid = ask(prober, data, wo, np.where(grid.solid_angle[:, None] > 0, grid.wi, [0, 0, 1]))[0]
     f, wi = ask(prober, data, wo, np.random.default_rng(3).random((60_000, 3)), 1)
     grid.assert_samples_follow(on_grid, f, wi[:, :3], len(CASES))
+
+
+def test_meshes_get_tangents_where_a_file_has_a_direction() -> None:
+    mesh = {"type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]],
+            "uvs": [[0, 0], [1, 0], [0, 1]], "normals": [[0.1, 0, 1], [0, 0.1, 1], [0, 0, 1]],
+            "material": "m"}  # fmt: skip
+    for row, has_direction in (("rgl rough", False), ("rgl brushed", True)):
+        document = {"version": 1, "camera": {"position": [0, 0, 1], "target": [0, 0, 0]}, "shapes": [mesh],
+                    "materials": {"m": {"type": "measured", "asset": "a"}}}  # fmt: skip
+        arrays = pack(parse_scene(document), Shelf(data_of(row))).arrays
+        raised = features.flags(arrays)
+        assert arrays.tangents == has_direction
+        assert ("HAS_TANGENTS" in raised, "HAS_ANISOTROPIC" in raised) == (has_direction, has_direction)

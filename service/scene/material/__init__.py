@@ -52,7 +52,10 @@ MODELS: dict[str, type[AnySurface]] = {model.name(): model for model in get_args
 
 
 def stretches(material: Material) -> bool:
-    """Whether the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices."""
+    """Whether the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices. Of
+    one that was measured its file would say so."""
+    if isinstance(material, MeasuredMaterial):
+        return True
     found = getattr(material, "anisotropic", 0.0)
     return bool((found.factor if isinstance(found, ScalarTexture) else found) > 0)
 
