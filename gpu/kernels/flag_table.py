@@ -131,6 +131,11 @@ def _thin_walls(s: SceneArrays) -> bool:
     return bool((_transmits(s.materials) & (s.materials["thin_walled"] > 0)).any())
 
 
+def _disperses(s: SceneArrays) -> bool:
+    parts = (s.materials["dispersion"] > 0) & ~(s.materials["thin_walled"] > 0)
+    return bool((_transmits(s.materials) & parts).any())
+
+
 def _mirrors(materials: np.ndarray) -> np.ndarray:
     """Materials that only mirror or refract, by their own numbers; textures may add others, or take some away."""
     m = materials
@@ -371,6 +376,7 @@ _ROWS = (
         previewed=_any_of(TRANSMITTING),
         in_general=False,
     ),
+    Flag("HAS_DISPERSION", _disperses, previewed=_any_of(TRANSMITTING), in_general=False),
     Flag("HAS_ATTENUATION", _attenuates, previewed=_any_of(TRANSMITTING)),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

@@ -103,6 +103,7 @@ class Material(Record):
     coat_anisotropy: f32
     coat_rotation: f32  # degrees
     thin_walled: f32  # 1: its surfaces are walls without an inside
+    dispersion: f32  # 1 over the Abbe number; 0: the same index for all wavelengths
 
 
 class Sphere(Record):

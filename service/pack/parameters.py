@@ -18,7 +18,7 @@ from service.scene.texture import ColorTexture, ScalarTexture
 
 # The renderer's names of a material's parameters, where they differ from the document's.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
-RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
+RENAMED |= {"abbe": "dispersion", "normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
 # Names that mean something else in one model.
 RENAMED_IN = {
     "blinn_phong": {"specular": "phong_specular"},
@@ -33,6 +33,7 @@ RENAMED_IN = {
         "specular_ior": "ior",
         "transmission_weight": "transmission",
         "transmission_color": "attenuation_color",
+        "transmission_dispersion_abbe_number": "dispersion",
         "coat_weight": "clearcoat",
         "coat_roughness": "clearcoat_roughness",
         "coat_roughness_anisotropy": "coat_anisotropy",

@@ -30,18 +30,3 @@ Scatter bsdf_scatter_world(Surface s, Interaction here, LobeSample lobe, vec3 d)
     if (lobe.is_delta) scatter = lobe.scatter;
     return scatter;
 }
-
-BsdfSample bsdf_sample_world(Surface s, Interaction here, SurfacePoint at, Sampler rng, uint bounce) {
-    uint pair = sobol_bounce_pair(bounce);
-    float u_lobe = sobol_pair(rng, pair + PAIR_CHOICE).y;
-    LobeSample lobe = bsdf_sample_local(s, here.wo, u_lobe, sobol_pair(rng, pair + PAIR_BSDF));
-    BsdfSample r;
-    r.d = normal_map_direction(here, lobe);
-    r.scatter = bsdf_scatter_world(s, here, lobe, r.d);
-    r.side = here.mapped ? dot(r.d, here.fold) : lobe.wi.z;
-    r.is_delta = lobe.is_delta;
-    float across = dot(r.d, here.front);
-    bool agrees = here.mapped ? normal_map_keeps(s, lobe) : terminator_agrees(at, r.d, lobe.wi.z, across);
-    r.valid = r.scatter.pdf > 0.0 && agrees;
-    return r;
-}

@@ -8,9 +8,9 @@ const float DELTA_GLINT = 1.0 / 3.0;
 
 // Scatters as bsdf_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
-    Surface s = surface_make(m, here.tangent);
+    Surface s = surface_make(hues_leading(m, path.hues), here.tangent);
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
-    LobeSample lobe = models_sample_delta(here.wo, here.behind, u, path.bounce == 0u ? DELTA_GLINT : 0.0, s);
+    LobeSample lobe = dispersion_sample_delta(here, m, u, path.bounce == 0u ? DELTA_GLINT : 0.0, s, path.hues);
     BsdfSample next;
     next.d = basis_to_world(here.basis, lobe.wi);
     next.scatter = lobe.scatter;

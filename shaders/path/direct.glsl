@@ -72,11 +72,12 @@ bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
 }
 
 // Adds the light of one sample of one light.
-void direct_add(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
+void direct_add(Surface s, Interaction here, Material m, LightContext context, float share, Sampler rng,
+                inout Path path) {
     uint pair = sobol_bounce_pair(path.bounce);
     uint pick_bits = sobol_bits(rng, pair + PAIR_CHOICE).x;
     LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
-    Scatter f = bsdf_eval_world(s, here, light.wi);
+    Scatter f = dispersion_eval(s, here, m, path.hues, light.wi);
     float across = dot(light.wi, here.front), side = dot(light.wi, here.facing);
     bool counts = direct_counts(light, path.hit.id) && (here.mapped || terminator_agrees(path.at, light.wi, side, across))
         && max_component(f.f * light.radiance) > 0.0;
@@ -90,14 +91,15 @@ void direct_add(Surface s, Interaction here, LightContext context, float share, 
 }
 
 // Adds the light that the surface receives from lights and sends on along the path.
-void direct_lighting(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
+void direct_lighting(Surface s, Interaction here, Material m, LightContext context, float share, Sampler rng,
+                     inout Path path) {
 #if HAS_LIGHTS
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
     uint doublings = direct_doublings(s, path.bounce), turn = 0u;
-    do direct_add(s, here, context, share, sobol_part(rng, turn, doublings), path);
+    do direct_add(s, here, m, context, share, sobol_part(rng, turn, doublings), path);
     while (++turn < (1u << doublings));
 #else
-    direct_add(s, here, context, share, rng, path);
+    direct_add(s, here, m, context, share, rng, path);
 #endif
 #endif
 }

@@ -79,6 +79,7 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
     here.transmits = material_transmits(m);
+    hues_meet(m, path.hues);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     here.fold = here.front;

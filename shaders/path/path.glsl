@@ -1,6 +1,6 @@
 // The estimator: the light that reaches the camera along one path. path/path_trace.glsl traces a ray and
 // adds the emission that it finds, path/interaction.glsl describes the surface, path/direct.glsl adds direct light,
-// path/bsdf_world.glsl picks the next direction and path/path_extend.glsl turns the path there.
+// path/path_sample.glsl picks the next direction and path/path_extend.glsl turns the path there.
 #include "bsdf/bsdf.glsl"
 #include "lights/lights.glsl"
 #include "shapes/transparency.glsl"
@@ -9,10 +9,13 @@
 #include "path/found_light.glsl"
 #include "path/sides.glsl"
 #include "path/terminator.glsl"
+#include "path/hues.glsl"
 #include "path/path_extend.glsl"
 #include "path/interaction.glsl"
 #include "path/normal_map.glsl"
 #include "path/bsdf_world.glsl"
+#include "path/dispersion.glsl"
+#include "path/path_sample.glsl"
 #include "path/direct.glsl"
 #include "path/path_trace.glsl"
 #include "path/delta_chain.glsl"
@@ -21,7 +24,7 @@ bool path_was_cut;   // the last path's budget did not last
 bool path_was_lost;  // the driver has ended the last path before its time
 
 // Begins a path that leaves the camera from o along d.
-Path path_begin(vec3 o, vec3 d, Medium medium) {
+Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     budget_begin();
     Path path;
     path.o = o;
@@ -36,6 +39,7 @@ Path path_begin(vec3 o, vec3 d, Medium medium) {
     path.eta_scale = 1.0;
     path.medium = medium;
     path.cone = cone_begin(d);
+    path.hues = hues_begin(rng, turn);
     return path;
 }
 
@@ -49,23 +53,42 @@ vec4 path_finish(Path path) {
     return vec4(path_was_lost ? path.radiance_before : path.radiance, path.alpha);
 }
 
-// The radiance that a path brings to o from the direction d, and its alpha.
-vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
-    Path path = path_begin(o, d, medium);
+// The path that brings light to o from the direction d.
+Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
+    Path path = path_begin(rng, o, d, medium, turn);
     path_trace_ahead(rng, path);
     if (path.alive) do {
         Interaction here;
         Material m;
         if (delta_chain(rng, path, here, m)) {
-            Surface s = interaction_surface(here, m);
+            Surface s = interaction_surface(here, hues_leading(m, path.hues));
             path.lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);
-            direct_lighting(s, here, path.lit, share, rng, path);
-            BsdfSample next = bsdf_sample_world(s, here, path.at, rng, path.bounce);
+            direct_lighting(s, here, m, path.lit, share, rng, path);
+            BsdfSample next = path_sample(s, here, m, rng, path);
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);
         }
     } while (path.alive);
-    return path_finish(path);
+    return path;
+}
+
+// The radiance that a path brings to o from the direction d, and its alpha.
+vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
+#if HAS_DISPERSION
+    vec4 sum = vec4(0.0);
+    bool cut = false, again;
+    uint turns = 0u;
+    do {
+        Path path = path_follow(rng, o, d, medium, turns);
+        sum += path_finish(path);
+        cut = cut || path_was_cut;
+        again = hues_again(path.hues, ++turns) && !path_was_lost;
+    } while (again);
+    path_was_cut = cut;
+    return sum / float(turns);
+#else
+    return path_finish(path_follow(rng, o, d, medium, 0u));
+#endif
 }

@@ -23,6 +23,7 @@ struct Path {
     float eta_scale;
     Medium medium;
     Cone cone;
+    Hues hues;
 };
 
 // A throughput below this may end the path by chance. It is below 1 because the variance of ended paths costs more than

@@ -134,6 +134,7 @@ SCENES: dict[str, Doc] = {
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
     "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
+    "DISPERSION": made_of({**GLASS, "abbe": 30}),
     "THIN_WALLS": made_of({**GLASS, "thin_walled": True}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
 }  # fmt: skip

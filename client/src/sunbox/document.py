@@ -499,6 +499,10 @@ class OpenpbrMaterial(TypedDict, total=False):
     0.0)"""
     transmission_color: list[float] | float | str | ColorTexture
     """Tints light each time that it passes the surface. (0 to 1, default [1.0, 1.0, 1.0])"""
+    transmission_dispersion_scale: float
+    """How much of the dispersion that the Abbe number stands for; 0 is none. (0 to 1, default 0.0)"""
+    transmission_dispersion_abbe_number: float
+    """How little refracted light spreads into colours: flint 30, diamond 55, crown 60. (0 to 1e+09, default 20.0)"""
     coat_weight: float | ScalarTexture
     """How much of the surface a clear coat covers. (0 to 1, default 0.0)"""
     coat_color: list[float] | float | str | ColorTexture
@@ -657,6 +661,8 @@ class PrincipledMaterial(TypedDict, total=False):
     """Share of the base that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default 0.0)"""
     ior: float | ScalarTexture
     """Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise. (1 to 4)"""
+    abbe: float
+    """Spreads what glass refracts into colours: flint 30, diamond 55, crown 60; without it, none. (0 to 1e+09)"""
     attenuation_color: list[float] | float | str | ColorTexture
     """What is left of white light after the attenuation distance inside. (0 to 1, default [1.0, 1.0, 1.0])"""
     attenuation_distance: float | ScalarTexture

@@ -3,7 +3,9 @@
 surface         emission, opacity and a normal map, which every material may have
 conversion      a material turned into another model
 peaks           widths of the peaks of facets' distributions
+abbe            dispersion by the Abbe number
 conductor       the complex index of metals
+tangent         the direction along which a highlight is stretched
 parameters      parameters that several models share
 diffuse         the Lambertian model
 disney          the "principled" BRDF of 2012

@@ -6,15 +6,16 @@ the specification assumes ACEScg; lengths are metres. What the specification lea
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
 from service.scene.material import openpbr_words
+from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.surface import AnySurface, EmissionSides, Height
-from service.scene.numbers import BRIGHTEST, LARGEST, Vec3, check_number, described, vector_schema
+from service.scene.material.tangent import Tangent, turn_of
+from service.scene.numbers import BRIGHTEST, Fraction
 from service.scene.texture import (
     REFERENCE_TAG,
     VALUE_TAG,
@@ -31,10 +32,9 @@ from service.scene.texture import (
 LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
 # Parameters of OpenPBR that the renderer has nothing for yet.
 UNSUPPORTED = (
-    "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "transmission_dispersion_scale",
-    "transmission_dispersion_abbe_number", "subsurface_weight", "subsurface_color", "subsurface_radius",
-    "subsurface_radius_scale", "subsurface_scatter_anisotropy", "thin_film_weight", "thin_film_thickness",
-    "thin_film_ior",
+    "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "subsurface_weight",
+    "subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy",
+    "thin_film_weight", "thin_film_thickness", "thin_film_ior",
 )  # fmt: skip
 
 Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
@@ -42,23 +42,6 @@ AnyPositiveIndex = Annotated[
     Annotated[Index, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
-
-
-def _tangent(value: Any) -> Vec3:
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise refusal(f"must be three numbers like [1, 0, 0], not {described(value)}")
-    x, y, z = (check_number(v, -LARGEST, LARGEST, name) for v, name in zip(value, "xyz", strict=True))
-    if x == 0 and y == 0:
-        raise refusal("must not be along the normal: x and y are both 0")
-    return x, y, z
-
-
-Tangent = Annotated[Vec3, PlainValidator(_tangent), WithJsonSchema(vector_schema(-LARGEST, LARGEST))]
-
-
-def _turn(tangent: Vec3) -> float:
-    """Its angle in degrees, counter-clockwise from the surface's own."""
-    return math.degrees(math.atan2(tangent[1], tangent[0]))
 
 
 class OpenpbrMaterial(AnySurface):
@@ -179,6 +162,20 @@ class OpenpbrMaterial(AnySurface):
             widget="color",
         ),
     ] = (1.0, 1.0, 1.0)
+    transmission_dispersion_scale: Annotated[
+        Fraction,
+        hint(
+            "Dispersion", "How much of the dispersion that the Abbe number stands for; 0 is none.",
+            group="Transmission", unit="", widget="slider",
+        ),
+    ] = 0.0  # fmt: skip
+    transmission_dispersion_abbe_number: Annotated[
+        Abbe,
+        hint(
+            "Abbe number", "How little refracted light spreads into colours: flint 30, diamond 55, crown 60.",
+            group="Transmission", unit="", widget="slider", soft=(9, 91),
+        ),
+    ] = 20.0  # fmt: skip
     coat_weight: Annotated[
         AnyFraction,
         hint(
@@ -367,8 +364,10 @@ class OpenpbrMaterial(AnySurface):
             if isinstance(found, ColorTexture):
                 return found.model_copy(update={"factor": tuple(share * x for x in found.factor)})
             return tuple(share * x for x in found)
+        if name == "transmission_dispersion_abbe_number":
+            return dispersion(found, self.transmission_dispersion_scale)
         if name in ("geometry_tangent", "geometry_coat_tangent"):
-            return 0.0 if found is None else _turn(found)
+            return 0.0 if found is None else turn_of(found)
         return found
 
     @classmethod

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.disney import DisneyMaterial
 from service.scene.texture import (
@@ -56,6 +57,19 @@ class PrincipledMaterial(DisneyMaterial):
             unit="",
             widget="slider",
             follows=("specular", index_of_specular),
+        ),
+    ] = None
+    abbe: Annotated[
+        Abbe | None,
+        OMITTABLE,
+        hint(
+            "Abbe number",
+            "Spreads what glass refracts into colours: flint 30, diamond 55, crown 60; without it, none.",
+            group="Transmission",
+            unit="",
+            widget="slider",
+            soft=(10, 100),
+            absent="none",
         ),
     ] = None
     attenuation_color: Annotated[
@@ -228,4 +242,6 @@ class PrincipledMaterial(DisneyMaterial):
         return self.thin_walled or passes
 
     def value(self, name: str) -> Any:
+        if name == "abbe":
+            return dispersion(self.abbe)
         return self.is_thin if name == "thin_walled" else super().value(name)

@@ -98,8 +98,14 @@ def test_colours_have_three_forms() -> None:
 
 UNTEXTURED = {
     "MicrofacetMaterial": {"gamma", "ior", "conductor_eta", "conductor_k", "diffuse_roughness"},
-    "OpenpbrMaterial": {"emission_luminance", "geometry_tangent", "geometry_coat_tangent"},
-    "PrincipledMaterial": {"conductor_eta", "conductor_k"},
+    "OpenpbrMaterial": {
+        "emission_luminance",
+        "geometry_tangent",
+        "geometry_coat_tangent",
+        "transmission_dispersion_scale",
+        "transmission_dispersion_abbe_number",
+    },
+    "PrincipledMaterial": {"abbe", "conductor_eta", "conductor_k"},
 }
 
 
