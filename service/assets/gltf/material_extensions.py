@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 from service.assets.gltf import anisotropy_texture
 from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.textures import factor
+from service.scene.numbers import LARGEST
 
 if TYPE_CHECKING:
     from service.assets.gltf.material_reader import MaterialReader
 
 DEFAULT_IOR, LARGEST_IOR = 1.5, 4.0
+SHOWN_ABBE, LEAST_ABBE = 20.0, 1e-9  # the Abbe number of a dispersion of 1; the least that is read
 
 
 def add(read: MaterialReader, document: dict[str, Any]) -> None:
@@ -171,6 +173,9 @@ def _volume(read: MaterialReader, document: dict[str, Any]) -> None:
     if volume is None:
         document["thin_walled"] = True
         return
+    dispersion = read.place.extension("KHR_materials_dispersion")
+    if dispersion and (share := dispersion.number("dispersion", 0, 0)) > 0:
+        document["abbe"] = min(max(SHOWN_ABBE / share, LEAST_ABBE), LARGEST)
     if "thicknessTexture" in volume:
         read.notes.add(
             volume.at("thicknessTexture"),

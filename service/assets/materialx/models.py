@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 from service.assets.materialx import openpbr
-from service.assets.materialx.surface import DISPERSION, FILM, NITS, TANGENT, Surface
+from service.assets.materialx.surface import FILM, NITS, TANGENT, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -25,6 +25,7 @@ from service.assets.materialx.trees import (
     times,
 )
 
+SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1 of gltf_pbr
 COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
 COAT_TINT = "the colour of the coat tints what is under it, at all angles alike"
 DARKER = "the coat does not darken what is under it"
@@ -49,13 +50,14 @@ def standard_surface(s: Surface) -> None:
     s.put("transmission", "transmission", transmission, 0.0)
     _sheen(s, s.tree("sheen"), s.tree("sheen_color"), s.tree("sheen_roughness"), "sheen")
     _coat(s, "coat", "coat_roughness", "coat_IOR", "coat_normal")
+    if s.is_used("transmission_dispersion", 0):
+        s.abbe(s.number("transmission_dispersion", 0))
     _emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission")
     s.put("alpha", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("normal_map", "normal")
     s.lose([
         ("diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("transmission_dispersion", 0, DISPERSION),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
         ("coat_anisotropy", 0, "an anisotropic coat is not supported"),
         ("coat_affect_color", 0, DARKER),
@@ -91,6 +93,9 @@ def open_pbr_surface(s: Surface) -> None:
     s.put("transmission", "transmission_weight", s.tree("transmission_weight"), 0.0)
     _sheen(s, s.tree("fuzz_weight"), s.tree("fuzz_color"), s.tree("fuzz_roughness"), "fuzz_weight")
     _coat(s, "coat_weight", "coat_roughness", "coat_ior", "geometry_coat_normal")
+    if s.is_used("transmission_dispersion_scale", 0):
+        share = s.number("transmission_dispersion_scale", 0)
+        s.abbe(s.number("transmission_dispersion_abbe_number", 20) / share if share > 0 else 0)
     light = times(s.tree("emission_color"), times(s.tree("emission_luminance"), NITS))
     _emission(s, light, "emission_luminance")
     s.put("alpha", "geometry_opacity", s.tree("geometry_opacity"), 1.0)
@@ -98,7 +103,6 @@ def open_pbr_surface(s: Surface) -> None:
     s.lose([
         ("base_diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("transmission_dispersion_scale", 0, DISPERSION),
         ("coat_roughness_anisotropy", 0, "an anisotropic coat is not supported"),
         ("thin_film_weight", 0, FILM),
     ])  # fmt: skip
@@ -142,10 +146,11 @@ def gltf_pbr(s: Surface) -> None:
     if mode == 1:
         s.put("alpha_cutoff", "alpha_cutoff", s.tree("alpha_cutoff"))
     s.normal("normal_map", "normal")
+    if s.is_used("dispersion", 0) and (share := s.number("dispersion", 0)) > 0:
+        s.abbe(SHOWN_ABBE / share)
     s.lose([
         ("occlusion", 1, "ambient occlusion is left out: the light that reaches a corner is traced"),
         ("iridescence", 0, FILM),
-        ("dispersion", 0, DISPERSION),
     ])  # fmt: skip
     _tangent(s)
 

@@ -4,7 +4,7 @@ is a tree, as in `models`. The tables of docs/files.md say the same in words.
 
 from __future__ import annotations
 
-from service.assets.materialx.surface import DISPERSION, FILM, NITS, Surface
+from service.assets.materialx.surface import FILM, NITS, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -17,6 +17,7 @@ from service.assets.materialx.trees import (
     raised,
     times,
 )
+from service.scene.numbers import LARGEST
 
 # Parameters that the node calls as OpenPBR does, and their defaults, which are those of the library.
 SAME = {
@@ -75,9 +76,12 @@ def open_pbr_surface(s: Surface) -> None:
     s.normal("geometry_coat_normal", "geometry_coat_normal")
     for name in ("geometry_tangent", "geometry_coat_tangent"):
         s.tangent(name, name)
+    if s.is_used("transmission_dispersion_scale", 0):
+        _disperse(
+            s, s.number("transmission_dispersion_scale", 0), s.number("transmission_dispersion_abbe_number", 20)
+        )
     s.lose([
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("transmission_dispersion_scale", 0, DISPERSION),
         ("thin_film_weight", 0, FILM),
     ])  # fmt: skip
 
@@ -102,6 +106,8 @@ def standard_surface(s: Surface) -> None:
     if s.is_used("transmission", 0):
         _set(s, "transmission_weight", "transmission")
         _set(s, "transmission_color", "transmission_color")
+        if s.is_used("transmission_dispersion", 0):
+            _disperse(s, 1.0, s.number("transmission_dispersion", 0))
     if s.is_set("thin_walled"):
         s.material["geometry_thin_walled"] = True
     if s.is_used("coat", 0):
@@ -116,10 +122,15 @@ def standard_surface(s: Surface) -> None:
     s.normal("geometry_normal", "normal")
     s.lose([
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("transmission_dispersion", 0, DISPERSION),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
         ("thin_film_thickness", 0, FILM),
     ])  # fmt: skip
+
+
+def _disperse(s: Surface, scale: float, abbe: float) -> None:
+    if scale > 0 and abbe > 0:
+        s.material["transmission_dispersion_scale"] = min(scale, 1.0)
+        s.material["transmission_dispersion_abbe_number"] = min(abbe, LARGEST)
 
 
 def _set(s: Surface, parameter: str, name: str) -> None:

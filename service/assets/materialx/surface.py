@@ -13,6 +13,7 @@ from service.assets.materialx.evaluation import fixed, in_frame
 from service.assets.materialx.graph import Graphs
 from service.assets.materialx.trees import Tree, Unsupported
 from service.assets.materialx.values import Values
+from service.scene.numbers import LARGEST
 
 BRIGHTEST = 1e6
 # Ranges of parameters that are no shares, and colours without an upper end.
@@ -27,7 +28,6 @@ COLORS = (
 )  # fmt: skip
 NITS = 1 / 683  # watts of a lumen
 FILM = "thin films are not supported and are left out"
-DISPERSION = "dispersion is not supported and is left out"
 TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
 
 
@@ -95,6 +95,11 @@ class Surface:
             return
         if default is None or isinstance(value, dict | list) or abs(value - default) > 1e-6:
             self.material[parameter] = value
+
+    def abbe(self, number: float) -> None:
+        """Take an Abbe number; 0 is none."""
+        if number > 0:
+            self.material["abbe"] = min(number, LARGEST)
 
     def normal(self, parameter: str, name: str, tree: Tree | None = None) -> None:
         found = tree or self.graphs.normal(self.node, name)

@@ -15,9 +15,10 @@ from service.scene.texture import ColorTexture, ScalarTexture
 
 WHITE = (1.0, 1.0, 1.0)
 LUMINANCE = (0.3, 0.6, 0.1)  # of the hue that tints, as the model has it
+SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1
 SPECULAR, SPECULAR_IOR = 0.5, 1.5  # principled's own reflectance head-on, and its index
 WRITTEN = {
-    "specular", "specular_color", "specular_tint", "ior", "transmission", "attenuation_color",
+    "specular", "specular_color", "specular_tint", "ior", "transmission", "abbe", "attenuation_color",
     "attenuation_distance", "sheen", "sheen_color", "sheen_tint", "sheen_roughness", "clearcoat", "clearcoat_gloss",
     "clearcoat_roughness", "clearcoat_normal_map", "anisotropic", "anisotropic_rotation", "thin_walled",
     "diffuse_transmission", "diffuse_transmission_color",
@@ -82,6 +83,8 @@ def _transmission(of: MaterialWriter) -> Tree:
         shade = color.factor if isinstance(color, ColorTexture) else color
         if shade != WHITE:
             volume["attenuationColor"] = [min(each, 1.0) for each in shade]
+    if m.abbe is not None:
+        found |= of.builder.extension("KHR_materials_dispersion", {"dispersion": SHOWN_ABBE / m.abbe})
     return found | of.builder.extension("KHR_materials_volume", volume)
 
 

@@ -77,6 +77,8 @@ def open_pbr_surface(m: OpenpbrMaterial, graph: Graph) -> Inputs:
 
 def _transmission(m: PrincipledMaterial, graph: Graph, made: Inputs) -> None:
     made["transmission"] = graph.number(m.transmission, "transmission")
+    if m.abbe is not None:
+        made["transmission_dispersion"] = number(m.abbe)
     if m.attenuation_distance is None or m.is_thin:
         made["transmission_color"] = made["base_color"]
         return

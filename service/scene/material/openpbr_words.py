@@ -8,12 +8,13 @@ from __future__ import annotations
 from typing import Any
 
 from service.scene.color import color
-from service.scene.numbers import BRIGHTEST, rounded
+from service.scene.numbers import BRIGHTEST, LARGEST, rounded
 
 Document = dict[str, Any]
 
 NITS = 683.0  # cd/m^2 of 1 W/(m^2 sr) in the middle of the eye's sensitivity
 BASE_IOR, COAT_IOR = 1.5, 1.5  # of other models
+ABBE = 20.0  # where a document has none
 STRETCH = 0.9  # what `anisotropic` of other models is in OpenPBR: a ratio of alphas of 1 to 10 at 1
 GLOSS = (0.1, 0.001)  # alpha of a coat without and with gloss
 _linear = color(BRIGHTEST)
@@ -31,6 +32,9 @@ def take(old: Document, made: Document) -> set[str]:
         made["specular_roughness_anisotropy"] = rounded(STRETCH * made["specular_roughness_anisotropy"], 4)
     if "transmission" in old and "base_color" in old:
         made["transmission_color"] = old["base_color"]
+    if "abbe" in old:
+        made |= {"transmission_dispersion_scale": 1, "transmission_dispersion_abbe_number": old["abbe"]}
+        used.add("abbe")
     if old.get("clearcoat", 0) != 0:
         made |= {"coat_ior": COAT_IOR, "coat_darkening": 0}
         gloss = old.get("clearcoat_gloss", 1.0)
@@ -69,6 +73,9 @@ def leave(old: Document, made: Document) -> set[str]:
         used.add("base_weight")
     if _is_number(made.get("anisotropic")):
         made["anisotropic"] = rounded(min(1.0, made["anisotropic"] / STRETCH), 4)
+    if (share := old.get("transmission_dispersion_scale", 0)) > 0:
+        made["abbe"] = min(old.get("transmission_dispersion_abbe_number", ABBE) / share, LARGEST)
+    used |= {"transmission_dispersion_scale", "transmission_dispersion_abbe_number"}
     if old.get("specular_weight", 1) == 1 or old.get("base_metalness") == 1:
         used.add("specular_weight")
     if old.get("coat_ior") == COAT_IOR:

@@ -183,6 +183,13 @@ def test_transmission_without_a_volume_is_a_thin_wall(store: AssetStore) -> None
     assert not {"ior", "clearcoat"} & made.keys()
 
 
+def test_the_abbe_number_is_20_over_the_dispersion(store: AssetStore) -> None:
+    body = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}}
+    for dispersion, abbe in ((0.5, 40), (0, None)):
+        given = {"extensions": {**body, "KHR_materials_dispersion": {"dispersion": dispersion}}}
+        assert material(store, given).get("abbe") == abbe
+
+
 def test_leaves_pass_diffuse_light(store: AssetStore) -> None:
     name = "diffuse_transmission"
     made = with_extension(store, name, {"diffuseTransmissionFactor": 0.4})

@@ -53,10 +53,10 @@ def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> 
             [value("base_color", [0.5, 0.25, 0.75]), value("specular_roughness", 0.2),
              value("transmission_weight", 1), value("transmission_color", [0.9, 0.8, 0.7]),
              value("transmission_depth", 0.25),
-             value("transmission_dispersion_scale", 1), value("emission_luminance", 683)],
+             value("transmission_dispersion_scale", 0.5), value("emission_luminance", 683)],
             {"base_color": 1.0, "roughness": 0.2, "transmission": 1.0, "attenuation_distance": 0.25,
-             "attenuation_color": [0.9, 0.8, 0.7], "emission": 1.0},
-            {"SM/transmission_dispersion_scale"},
+             "attenuation_color": [0.9, 0.8, 0.7], "emission": 1.0, "abbe": 40.0},
+            set(),
         ),
         (
             "gltf_pbr",

@@ -43,7 +43,7 @@ def test_open_pbr_is_openpbr_without_a_loss(store: AssetStore) -> None:
 def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
     unsupported = [
         value("subsurface_weight", 0.5), value("subsurface_color", 0, "color3").replace('"0"', '"0, 0, 0"'),
-        value("base_color", [0.8, 0.4, 0.2]), value("transmission_dispersion_scale", 1), value("thin_film_weight", 1),
+        value("base_color", [0.8, 0.4, 0.2]), value("thin_film_weight", 1),
         value("geometry_tangent", "1, 0, 0", "vector3"),
         value("transmission_scatter", [0.1, 0.2, 0.3]),
     ]  # fmt: skip
@@ -51,7 +51,7 @@ def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
     assert material(imported) == {"type": "openpbr", "base_color": pytest.approx([0.4, 0.2, 0.1])}
     assert losses(imported) == {
         f"SM/{name}" for name in (
-            "subsurface_weight", "transmission_dispersion_scale", "thin_film_weight", "geometry_tangent",
+            "subsurface_weight", "thin_film_weight", "geometry_tangent",
             "transmission_scatter",
         )
     }  # fmt: skip

@@ -139,6 +139,16 @@ def test_a_scene_of_meshes_comes_back_to_the_bit(store: AssetStore, gpu: Rendere
     assert one.mean() > 0.1 and np.array_equal(one, other)
 
 
+def test_dispersion_comes_back_to_the_bit(store: AssetStore, gpu: Renderer) -> None:
+    flint = {"type": "principled", "base_color": 1, "transmission": 1, "roughness": 0.25, "ior": 1.75, "abbe": 32}
+    before = scene({**TENT, "material": "flint"}, materials={"flint": flint}, lights=LIGHTS)
+    made = exported(before, store)
+    assert lost(made) == {}
+    after = again(made, store)
+    assert after["materials"]["flint"]["abbe"] == 32
+    assert np.array_equal(pixels(gpu, before, store), pixels(gpu, after, store))
+
+
 def test_thin_walls_come_back_to_the_bit(store: AssetStore, gpu: Renderer) -> None:
     pane = {
         "type": "principled",

@@ -33,7 +33,7 @@ FULL: dict[str, Any] = {
 }  # fmt: skip
 GLASS = {
     "type": "principled", "base_color": 1.0, "roughness": 0.1, "ior": 1.33, "transmission": 1.0,
-    "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125,
+    "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125, "abbe": 40.0,
 }  # fmt: skip
 TINTED = {"type": "principled", "base_color": [0.2, 0.1, 0.9], "roughness": 0.2, "transmission": 1.0}
 PANE = {"type": "principled", "base_color": [0.9, 1.0, 0.8], "roughness": 0.3, "transmission": 1.0, "ior": 1.45,
@@ -44,7 +44,9 @@ OPENPBR = {
     "type": "openpbr", "base_weight": 0.9, "base_color": [0.5, 0.25, 0.75], "base_diffuse_roughness": 0.4,
     "base_metalness": 0.5, "specular_weight": 1.5, "specular_color": [0.9, 0.8, 0.7], "specular_roughness": 0.3,
     "specular_roughness_anisotropy": 0.6, "specular_ior": 0.75, "transmission_weight": 0.25,
-    "transmission_color": [0.1, 0.2, 0.3], "coat_weight": 0.5, "coat_color": [0.6, 0.5, 0.4], "coat_roughness": 0.1,
+    "transmission_color": [0.1, 0.2, 0.3], "transmission_dispersion_scale": 0.5,
+    "transmission_dispersion_abbe_number": 30.0,
+    "coat_weight": 0.5, "coat_color": [0.6, 0.5, 0.4], "coat_roughness": 0.1,
     "coat_roughness_anisotropy": 0.3, "coat_ior": 1.7, "coat_darkening": 0.75, "fuzz_weight": 0.2,
     "fuzz_color": [0.3, 0.2, 0.1], "fuzz_roughness": 0.6, "emission_luminance": 500.0,
     "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8, "geometry_tangent": [0.6, -0.8, 0.0],
