@@ -99,7 +99,9 @@ def _optional(member: str) -> Asks:
     """Whether a material has it above 0: the first channel of one that has several."""
 
     def asks(s: SceneArrays) -> bool:
-        values = s.materials[member].reshape(len(s.materials), -1)[:, 0]
+        values = s.materials[member]
+        if values.ndim > 1:
+            values = values[:, 0]
         return bool((of(s.materials, with_optional(member)) & (values > 0)).any())
 
     return asks

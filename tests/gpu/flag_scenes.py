@@ -117,6 +117,11 @@ SCENES: dict[str, Doc] = {
     "ENVIRONMENT_IMAGE": document([FLOOR], environment={"type": "image", "asset": "floats"}),
     "ENVIRONMENT_CUBE": document([FLOOR], environment={"type": "cubemap", "assets": {
         f"{sign}{axis}": "face" for axis in "xyz" for sign in "pn"}}),
+    "ORTHOGRAPHIC": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "type": "orthographic", "height": 3}),
+    "PANORAMA": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "type": "panorama"}),
+    "OPENPBR": made_of({"type": "openpbr", "specular_roughness": 0}),
+    "OPENPBR_LOBES": made_of({"type": "openpbr"}),
+    "DIFFUSE_ROUGHNESS": made_of({"type": "openpbr", "base_diffuse_roughness": 0.5}),
     "APERTURE": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}),
     "DISNEY": made_of({"type": "disney"}), "SUBSURFACE": made_of({"type": "disney", "subsurface": 1}),
     "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),

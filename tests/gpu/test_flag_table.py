@@ -11,6 +11,7 @@ from gpu import KernelKey, RenderSettings, SceneArrays
 from gpu.bsdf.kernels import ENTRIES
 from gpu.kernels import features
 from gpu.kernels.flag_table import ANYWHERE, FLAGS, Flag
+from gpu.layout.models import FLAGGED
 from gpu.precompile import fallback, kernel_keys
 from service.pack import pack, pack_material
 from service.scene import parse_scene
@@ -133,3 +134,8 @@ def test_rows_name_flags_that_there_are() -> None:
     for flag in FLAGS.values():
         for names in (flag.raised_with, flag.compiled_with, flag.follows, flag.evaluated_with):
             assert names == ANYWHERE or set(names) <= set(FLAGS), flag.name
+
+
+def test_a_scene_without_materials_raises_no_flag_of_one() -> None:
+    empty = {**document([]), "materials": {}}
+    assert not features.flags(pack(parse_scene(empty), IMAGES).arrays) & {model.flag for model in FLAGGED}

@@ -55,6 +55,7 @@ REQUIRED = {
     "metal_rough": {"base_color": 0.25, "metallic": 0.5, "roughness": 0.75},
     "blinn_phong": {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
     "phong": {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
+    "measured": {"asset": "sha256:" + 64 * "0"},
 }
 MEMBERS = {
     ("diffuse", "albedo"): "base_color",
@@ -90,6 +91,7 @@ def test_every_number_of_a_material_has_its_place(model):
     seen = set()
     own = set(fields) - {
         "type",
+        "asset",
         "emission_sides",
         "alpha",
         "alpha_cutoff",
