@@ -61,6 +61,11 @@ PRINCIPLED = {
     "gold": materials(
         model=P, metallic=1, roughness=0.4, conductor_eta=(0.18, 0.42, 1.37), conductor_k=(3.42, 2.35, 1.77),
     ),
+    "oxide": materials(
+        model=P, metallic=1, roughness=0.5, base_color=(1, 0.78, 0.34), film_thickness=60, film_ior=2.3,
+    ),
+    "oiled": materials(model=P, roughness=0.5, base_color=(0.1, 0.4, 0.7), film_thickness=350, film_ior=1.9),
+    "iridescent glass": materials(roughness=0.7, film_thickness=400, film_ior=1.8, **GLASS),
     "all at once": materials(
         model=P, base_color=(0.6, 0.3, 0.2), metallic=0.3, subsurface=0.4, specular=0.8, roughness=0.45,
         specular_tint=0.5, anisotropic=0.6, sheen=0.7, sheen_tint=0.3, clearcoat=0.8, clearcoat_gloss=0.2,
@@ -80,6 +85,8 @@ OPENPBR = {
     "red coat": openpbr(**RED_COAT, coat_anisotropy=0.7, coat_rotation=50, roughness=0.5),
     "coated glass": openpbr(**RED_COAT, transmission=0.9, roughness=0.4),
     "fuzz": openpbr(sheen=1, sheen_roughness=0.6, sheen_color=(1, 0.2, 0.4), base_color=0.1),
+    "filmed": openpbr(film_thickness=450, film_ior=2, diffuse_roughness=0.7, roughness=0.4, film_weight=0.8),
+    "filmed layers": openpbr(**RED_COAT, film_thickness=300, transmission=0.4, metallic=0.3, roughness=0.5),
     "fine fuzz": openpbr(sheen=1, sheen_roughness=0.15, specular=0),
     "layers": openpbr(**RED_COAT, sheen=0.5, transmission=0.3, metallic=0.3, diffuse_roughness=0.5, roughness=0.5),
 }

@@ -41,6 +41,7 @@ def materials(**members: Any) -> np.ndarray:
     defaults = {"base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0}
     defaults["opacity"] = 1.0
     defaults |= {"specular_color": 1.0, "attenuation_color": 1.0, "sheen_roughness": 0.5}
+    defaults |= {"film_weight": 1.0, "film_ior": 1.4}
     for name in ("ior", "attenuation_distance", "clearcoat_roughness", "sheen_color", "diffuse_transmission_color"):
         defaults[name] = layout.ABSENT
     for name, value in {**defaults, **members}.items():
@@ -57,7 +58,7 @@ def openpbr(**members: Any) -> np.ndarray:
 
 def rare(record: np.ndarray) -> frozenset[str]:
     """The flags that a material raises for code which kernels have only where a scene needs it."""
-    members = {"HAS_CONDUCTOR": "conductor_eta", "HAS_THIN_WALLS": "thin_walled"}
+    members = {"HAS_CONDUCTOR": "conductor_eta", "HAS_THIN_WALLS": "thin_walled", "HAS_FILM": "film_thickness"}
     return frozenset(flag for flag, member in members.items() if (record[member] > 0).any())
 
 

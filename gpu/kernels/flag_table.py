@@ -147,6 +147,13 @@ def _mirrors(materials: np.ndarray) -> np.ndarray:
     return out
 
 
+def _filmed(materials: np.ndarray) -> np.ndarray:
+    """Materials under a thin film."""
+    m = materials
+    out: np.ndarray = of(m, with_optional("film_thickness")) & (m["film_thickness"] > 0) & (m["film_weight"] > 0)
+    return out
+
+
 def _spreads(s: SceneArrays, model: Model) -> bool:
     """Whether kernels need the lobes of a model: not where all such materials only mirror or refract, and there is
     clear glass, so that their paths take the short loop of path/delta_chain.glsl."""
@@ -352,6 +359,12 @@ _ROWS = (
         _optional("conductor_eta"),
         evaluated_with=_flags_of(with_optional("conductor_eta")),
         previewed=_any_of(with_optional("conductor_eta")),
+        in_general=False,
+    ),
+    Flag(
+        "HAS_FILM",
+        lambda s: bool(_filmed(s.materials).any()),
+        evaluated_with=_flags_of(with_optional("film_thickness")),
         in_general=False,
     ),
     Flag(

@@ -47,7 +47,7 @@ def text() -> str:
     bases = {
         "vec3 models_metal(Surface s, float c)": "{}_metal(s, c)",
         "vec3 models_metal_mean(Surface s)": "{}_metal_mean(s)",
-        "vec3 models_tinted(Surface s, float f)": "{}_tinted(s, f)",
+        "vec3 models_tinted(Surface s, BASE_SHARE f)": "{}_tinted(s, f)",
     }
     return "\n".join([
         *(f"{head};" for head in bases),  # their callers come before the models

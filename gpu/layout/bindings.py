@@ -60,5 +60,12 @@ INSTANCES_TEXTURE = 14  # records in a texture, as all storage buffers are taken
 MICROFACETS_TEXTURE = 5  # records of the model `microfacet` and their tables
 MEASURED_TEXTURE = 15  # records of the model `measured` and their tables
 SPACES_TEXTURE = 6  # the shapes' own coordinates
-ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4, "fuzz": 7}  # tables of gpu.tables.energy
+ENERGY_TEXTURES = {
+    "albedo": 1,
+    "stretched": 2,
+    "mean": 3,
+    "sheen": 4,
+    "fuzz": 7,
+    "facets": 15,
+}  # of gpu.tables.energy
 TEXELS_A_ROW = 8192  # width of the textures that hold one long row of values, cut into rows

@@ -106,7 +106,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
-        optional=(*_LAYERS, "conductor_eta"),
+        optional=(*_LAYERS, "conductor_eta", "film_thickness"),
     ),
     Model(
         "openpbr",
@@ -119,7 +119,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
-        optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness"),
+        optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness", "film_thickness"),
         in_general=False,
     ),
 )

@@ -104,6 +104,9 @@ class Material(Record):
     coat_rotation: f32  # degrees
     thin_walled: f32  # 1: its surfaces are walls without an inside
     dispersion: f32  # 1 over the Abbe number; 0: the same index for all wavelengths
+    film_weight: f32  # the share of the surface that a thin film covers; 1 for `principled`
+    film_thickness: f32  # nm
+    film_ior: f32
 
 
 class Sphere(Record):

@@ -30,7 +30,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
         "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
         "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color", "coat_color", "base_weight",
         "diffuse_roughness", "coat_darkening", "coat_anisotropy",
-        "diffuse_transmission", "diffuse_transmission_color",
+        "diffuse_transmission", "diffuse_transmission_color", "film_weight",
     )
 } | {
     "shininess": LARGE,
@@ -38,6 +38,8 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     "anisotropic_rotation": (-1e9, 1e9),
     "ior": (1.0, 4.0),
     "coat_ior": (1.0, 4.0),
+    "film_ior": (1.0, 4.0),
+    "film_thickness": (0.0, 1e4),
     "alpha": LARGE,  # what the distribution allows comes later, in bsdf/models/microfacet.glsl
 }  # fmt: skip
 NORMALS = ("normal", "coat_normal")

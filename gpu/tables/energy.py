@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 FILE = Path(__file__).with_name("energy.npz")
+FACETS_FILE = Path(__file__).with_name("facets.npy")
 FUZZ_FILE = Path(__file__).with_name("fuzz.npy")
 
 MU_COUNT = 40  # cosines, as squares of equal steps
@@ -21,6 +22,7 @@ ALBEDO_SHAPE = (ETA_COUNT, 40, MU_COUNT)  # eta, roughness, cosine
 STRETCHED_SHAPE = (16, 9, 19, 14, 18)  # eta, aspect, roughness, azimuth, cosine
 MEAN_SHAPE = (2 * ETA_COUNT - 1, 1 + STRETCHED_SHAPE[1], 2 * ALBEDO_SHAPE[1] - 1)  # eta, round and aspect, roughness
 AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal steps: denser there
+FACETS_SHAPE = (8, 24, MU_COUNT, 4)  # layer, roughness, cosine
 SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
 LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1; aspects in the tables are equal ratios apart
 LARGEST_ETA = 4.0
@@ -41,6 +43,10 @@ class Tables:
     cosine and the albedo, of a layer of fibres, fitted by Zeltner, Burley and Chiang in "Practical
     Multiple-Scattering Sheen Using Linearly Transformed Cosines" (2022); the figures are those of
     github.com/tizian/ltc-sheen, Apache-2.0.
+
+    `facets` (layer, roughness, mu, 4): Gauss's rules for means over the facets of round lobes, by the cosine at them.
+    Layers 0 and 1 are four cosines and their weights for the facets that reflect light from a direction, 2 and 3 the
+    same for the cosine-weighted mean over all directions, 4 to 7 the same for all facets that the light meets.
     """
 
     albedo: np.ndarray
@@ -48,6 +54,7 @@ class Tables:
     mean: np.ndarray
     sheen: np.ndarray
     fuzz: np.ndarray
+    facets: np.ndarray
 
 
 def mu_nodes(count: int = MU_COUNT) -> np.ndarray:
@@ -98,4 +105,4 @@ def tables() -> Tables:
     # The albedo with Fresnel 1 is the same for every index and is stored once.
     one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
     found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)
-    return Tables(**found, fuzz=np.load(FUZZ_FILE))
+    return Tables(**found, fuzz=np.load(FUZZ_FILE), facets=np.load(FACETS_FILE))

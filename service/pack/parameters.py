@@ -40,6 +40,9 @@ RENAMED_IN = {
         "fuzz_weight": "sheen",
         "fuzz_color": "sheen_color",
         "fuzz_roughness": "sheen_roughness",
+        "thin_film_weight": "film_weight",
+        "thin_film_thickness": "film_thickness",
+        "thin_film_ior": "film_ior",
         "emission_color": "emission",
         "geometry_opacity": "opacity",
         "geometry_thin_walled": "thin_walled",
@@ -86,6 +89,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
     """`layout.Material` records in the order of the document's names, unused ones included."""
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     records["number"] = np.arange(len(records))
+    records["film_weight"] = 1.0  # of models that have no weight
     for record, material in zip(records, scene.materials.values(), strict=True):
         record["model"] = models.NUMBERS[material.type]
         for name in type(material).model_fields:

@@ -26,6 +26,7 @@ def _not_vanishing(value: float) -> float:
 
 Cosine = Annotated[float, Field(gt=0, le=1), AfterValidator(_not_vanishing)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+Thickness = Annotated[float, Field(ge=0, le=10000)]
 RefractiveIndex = Annotated[float, Field(ge=1, le=4)]
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(ge=0, le=LARGEST)]

@@ -16,6 +16,7 @@ from service.scene.numbers import (
     Fraction,
     PositiveLength,
     RefractiveIndex,
+    Thickness,
     check_number,
     described,
     vector_schema,
@@ -165,6 +166,9 @@ AnyLength = Annotated[
 ]
 AnyIndex = Annotated[
     Annotated[RefractiveIndex, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
+]
+AnyThickness = Annotated[
+    Annotated[Thickness, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyReflectance = Annotated[
     Annotated[Reflectance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)

@@ -35,6 +35,16 @@ struct Terms {
     bool has_facets;  // false: a perfect mirror
 };
 
+// The type of a share of light that depends on the boundary of bsdf/lobes/base: a colour where a film may lie on it.
+#if HAS_FILM
+#define BASE_SHARE vec3
+#else
+#define BASE_SHARE float
+#endif
+
+float base_grey(float share) { return share; }
+float base_grey(vec3 share) { return luminance(share); }
+
 const int BSDF_DELTAS = 3; // perfectly specular lobes that a surface has at most
 
 // A sample of lobes that are not perfectly specular.

@@ -66,6 +66,19 @@ vec4 energy_mean(float roughness, float aspect, float eta) {
     return texture(energy_mean_table, vec3(x, y / float(n.y), energy_place(energy_eta(eta), n.z)));
 }
 
+#if HAS_FILM
+layout(binding = ENERGY_FACETS_TEXTURE) uniform sampler3D energy_facets_table; // cosine, roughness, layer
+
+// Gauss's rules for means over the facets, by the light's cosine at them; c is its cosine at the surface. Layer 0: four
+// of these cosines; 1: their weights; 2 and 3: the same for cosine-weighted means over all directions; 4 to 7: the same
+// over all facets that the light meets, not only those that reflect it to its own side.
+vec4 energy_facets(float c, float roughness, float layer) {
+    ivec3 n = textureSize(energy_facets_table, 0);
+    float x = energy_place(sqrt(abs(c)), n.x), y = energy_place(energy_roughness(roughness), n.y);
+    return texture(energy_facets_table, vec3(x, y, (layer + 0.5) / float(n.z)));
+}
+#endif
+
 // The albedo of a white sheen from a direction of cosine c.
 float energy_sheen(float c, float roughness) {
     ivec3 n = textureSize(energy_sheen_table, 0);

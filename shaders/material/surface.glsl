@@ -44,6 +44,24 @@ struct Surface {
     vec3 diffuse_through;       // its colour
 #endif
 #endif
+#if ANY_NEEDS_TABLES && HAS_FILM
+    float film;            // how much of the boundary's reflectance is the film's, 0 where there is none
+    float film_thickness;  // um
+    float film_ior;
+    float film_outer;      // index of what lies on the film, where a vacuum's is 1,
+    float film_base;       // and of what lies under it
+    vec3 film_eta;         // of the metal under it,
+    vec3 film_k;           // whose index is film_eta + i film_k
+    vec3 film_mean;        // cosine-weighted mean of the dielectric's reflectance, from outside,
+    vec3 film_metal_mean;  // and of the metal's
+    vec3 film_once;        // the share of light from wo that its facets reflect once
+    vec3 film_kept;        // the share of light from wo that the boundary keeps from what is under it
+    vec3 film_kept_mean;   // its cosine-weighted mean
+    vec3 film_lost;        // the share of light from wo that is lost between the facets of glass,
+    vec3 film_lost_outside; // and its means, seen from outside
+    vec3 film_lost_inside; // and from inside
+    float film_cosine;     // of wo
+#endif
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame
 #endif

@@ -137,6 +137,7 @@ SCENES: dict[str, Doc] = {
     "MEASURED_LIMITS": made_of({"type": "measured", "asset": "bright"}),
     "MEASURED_ADAPTIVE": made_of({"type": "measured", "asset": "rgl"}),
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
+    "FILM": made_of({"type": "principled", "film_thickness": 300}),
     "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "DISPERSION": made_of({**GLASS, "abbe": 30}),

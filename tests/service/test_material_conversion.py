@@ -185,3 +185,28 @@ def test_thin_walls_stay_thin() -> None:
     made = converted({"type": "principled", "thin_walled": True, "transmission": 1}, "openpbr")
     assert made["geometry_thin_walled"] is True
     assert converted(made, "principled")["thin_walled"] is True
+
+
+def test_a_film_keeps_its_thickness_in_other_units() -> None:
+    soap = {"type": "principled", "film_thickness": 350, "film_ior": 1.33}
+    made, lost = asked(soap, "openpbr")
+    assert lost == [] and (made["thin_film_weight"], made["thin_film_thickness"], made["thin_film_ior"]) == (
+        1,
+        0.35,
+        1.33,
+    )
+    back, lost = asked(made, "principled")
+    assert lost == [] and soap.items() <= back.items()
+    textured = {"texture": "wood", "factor": 800}
+    assert asked({**soap, "film_thickness": textured}, "openpbr")[0]["thin_film_thickness"]["factor"] == 0.8
+    made, lost = asked({"type": "openpbr", "thin_film_weight": 0.5}, "principled")
+    assert made["film_thickness"] == 500 and lost == ["thin_film_weight"]
+    assert "film_thickness" not in converted({"type": "openpbr", "thin_film_thickness": 0.2}, "principled")
+
+
+def test_a_complex_index_goes_with_a_metal() -> None:
+    gold = {"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": [3.4, 2.4, 1.8]}
+    made, _ = asked(gold, "microfacet")
+    assert made["fresnel"] == "conductor" and made["conductor_k"] == gold["conductor_k"]
+    assert gold.items() <= converted(made, "principled").items()
+    assert "conductor_k" not in converted({**made, "fresnel": "schlick"}, "principled")

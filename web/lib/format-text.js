@@ -1,6 +1,6 @@
 // Numbers, units and names as an artist reads them.
 
-const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²", "cd/m^2": "cd/m²" };
+const UNITS = { degrees: "°", um: "µm", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²", "cd/m^2": "cd/m²" };
 const NAMES = {
   aces: "ACES",
   aces2: "ACES 2",

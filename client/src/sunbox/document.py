@@ -521,6 +521,13 @@ class OpenpbrMaterial(TypedDict, total=False):
     """Of the light that the fuzz reflects. (0 to 1, default [1.0, 1.0, 1.0])"""
     fuzz_roughness: float | ScalarTexture
     """How far it reaches from grazing angles inwards; cloth is low, dust high. (0 to 1, default 0.5)"""
+    thin_film_weight: float | ScalarTexture
+    """How much of the base a thin film covers, whose colours are those of interference. (0 to 1, default 0.0)"""
+    thin_film_thickness: float | ScalarTexture
+    """Soap 0.2 to 0.8, oxides of metals 0.03 to 0.2. (um, 0 to 1e+20, default 0.5)"""
+    thin_film_ior: float | ScalarTexture
+    """Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6; below 1 it is taken as 1. A texture gives 1 to 4. (0.001 to
+    1000, default 1.4)"""
     emission_luminance: float
     """Luminance that leaves the front side, times the colour: above 0 the shape is an area light. (cd/m^2, 0 to
     1e+20, default 0.0)"""
@@ -688,6 +695,11 @@ class PrincipledMaterial(TypedDict, total=False):
     """The metal's index of refraction, per channel, beside its k: in place of the base colour. (1e-30 to 1e+09)"""
     conductor_k: list[float] | float
     """The metal's extinction coefficient, per channel, beside its index. (0 to 1e+09)"""
+    film_thickness: float | ScalarTexture
+    """Of a thin film on the base, whose colours are those of interference: soap 200 to 800, oxides 30 to 200. (nm, 0
+    to 10000, default 0.0)"""
+    film_ior: float | ScalarTexture
+    """Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. (1 to 4, default 1.4)"""
     clearcoat_normal_map: NormalTexture
     """The coat's own; without it the coat is smooth over whatever is under it."""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture

@@ -8,17 +8,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
 from service.scene.material import openpbr_words
 from service.scene.material.abbe import Abbe, dispersion
+from service.scene.material.openpbr_film import AnyPositiveIndex, FilmIndex, FilmThickness, FilmWeight, in_nanometres
 from service.scene.material.surface import AnySurface, EmissionSides, Height
 from service.scene.material.tangent import Tangent, turn_of
 from service.scene.numbers import BRIGHTEST, Fraction
 from service.scene.texture import (
-    REFERENCE_TAG,
-    VALUE_TAG,
     AnyFactor,
     AnyFraction,
     AnyRadiometric,
@@ -26,21 +25,14 @@ from service.scene.texture import (
     ColorTexture,
     NormalTexture,
     ScalarTexture,
-    form_of,
 )
 
-LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
 # Parameters of OpenPBR that the renderer has nothing for yet.
 UNSUPPORTED = (
     "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "subsurface_weight",
     "subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy",
-    "thin_film_weight", "thin_film_thickness", "thin_film_ior",
 )  # fmt: skip
 
-Index = Annotated[float, Field(ge=LEAST_INDEX, le=LARGEST_INDEX)]
-AnyPositiveIndex = Annotated[
-    Annotated[Index, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
-]
 Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
 
 
@@ -268,6 +260,9 @@ class OpenpbrMaterial(AnySurface):
             widget="slider",
         ),
     ] = 0.5
+    thin_film_weight: FilmWeight = 0.0
+    thin_film_thickness: FilmThickness = 0.5
+    thin_film_ior: FilmIndex = 1.4
     emission_luminance: Annotated[
         Luminance,
         hint(
@@ -366,6 +361,8 @@ class OpenpbrMaterial(AnySurface):
             return tuple(share * x for x in found)
         if name == "transmission_dispersion_abbe_number":
             return dispersion(found, self.transmission_dispersion_scale)
+        if name == "thin_film_thickness":
+            return in_nanometres(found)
         if name in ("geometry_tangent", "geometry_coat_tangent"):
             return 0.0 if found is None else turn_of(found)
         return found

@@ -16,6 +16,8 @@ NITS = 683.0  # cd/m^2 of 1 W/(m^2 sr) in the middle of the eye's sensitivity
 BASE_IOR, COAT_IOR = 1.5, 1.5  # of other models
 ABBE = 20.0  # where a document has none
 STRETCH = 0.9  # what `anisotropic` of other models is in OpenPBR: a ratio of alphas of 1 to 10 at 1
+FILM = 0.5  # um, the default of `thin_film_thickness`
+THICKEST = 1e4  # nm, of other models' films
 GLOSS = (0.1, 0.001)  # alpha of a coat without and with gloss
 _linear = color(BRIGHTEST)
 
@@ -35,6 +37,10 @@ def take(old: Document, made: Document) -> set[str]:
     if "abbe" in old:
         made |= {"transmission_dispersion_scale": 1, "transmission_dispersion_abbe_number": old["abbe"]}
         used.add("abbe")
+    film = old.get("film_thickness", 0)
+    if isinstance(film, dict) or film > 0:
+        made |= {"thin_film_weight": 1, "thin_film_thickness": _scaled(film, 1e-3)}
+        used.add("film_thickness")
     if old.get("clearcoat", 0) != 0:
         made |= {"coat_ior": COAT_IOR, "coat_darkening": 0}
         gloss = old.get("clearcoat_gloss", 1.0)
@@ -42,6 +48,23 @@ def take(old: Document, made: Document) -> set[str]:
             made["coat_roughness"] = rounded((GLOSS[0] + (GLOSS[1] - GLOSS[0]) * gloss) ** 0.5, 4)
             used.add("clearcoat_gloss")
     return used
+
+
+def film(old: Document, made: Document) -> set[str]:
+    """From `old`, an `openpbr` or of any model without a film, into `made`, which has one in nanometres."""
+    weight = old.get("thin_film_weight", 0)
+    if weight == 0:
+        return {"thin_film_thickness", "thin_film_weight"}
+    thickness = _scaled(old.get("thin_film_thickness", FILM), 1e3)
+    made["film_thickness"] = min(thickness, THICKEST) if _is_number(thickness) else thickness
+    return {"thin_film_thickness"} | ({"thin_film_weight"} if weight == 1 else set())
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    """A number, or a texture, times a factor."""
+    if isinstance(value, dict):
+        return value | {"factor": rounded(factor * value.get("factor", 1.0), 6)}
+    return rounded(factor * value, 6)
 
 
 def _shine(emission: Any, made: Document) -> set[str]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.material import openpbr_words
 from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.disney import DisneyMaterial
@@ -17,6 +18,7 @@ from service.scene.texture import (
     AnyIndex,
     AnyLength,
     AnyReflectance,
+    AnyThickness,
     NormalTexture,
     ScalarTexture,
 )
@@ -206,6 +208,28 @@ class PrincipledMaterial(DisneyMaterial):
             example=[3.42, 2.35, 1.77],
         ),
     ] = None
+    film_thickness: Annotated[
+        AnyThickness,
+        hint(
+            "Film thickness",
+            "Of a thin film on the base, whose colours are those of interference: soap 200 to 800, oxides 30 to 200.",
+            group="Film",
+            unit="nm",
+            widget="slider",
+            soft=1000,
+        ),
+    ] = 0.0
+    film_ior: Annotated[
+        AnyIndex,
+        hint(
+            "Film index",
+            "Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6.",
+            group="Film",
+            unit="",
+            widget="slider",
+            soft=(1, 3),
+        ),
+    ] = 1.4
     clearcoat_normal_map: Annotated[
         NormalTexture | None,
         OMITTABLE,
@@ -226,13 +250,14 @@ class PrincipledMaterial(DisneyMaterial):
     @classmethod
     def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
         """A model whose menu has a conductor becomes a metal; elsewhere its index is of no use."""
+        used = openpbr_words.film(old, made)
         names = {"conductor_eta", "conductor_k"} & made.keys()
         if names and old.get("fresnel") == "conductor":
             made["metallic"] = 1
-            return names | {"fresnel"}
+            return used | names | {"fresnel"}
         for name in names:
             del made[name]
-        return set()
+        return used
 
     @property
     def is_thin(self) -> bool:

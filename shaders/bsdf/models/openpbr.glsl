@@ -2,9 +2,11 @@
 // The base is reciprocal. A layer of albedo E for wo leaves 1 - E of the light to what is under it, whatever wi is:
 // nothing is lost so, where a reciprocal rule would lose up to a tenth under a white coat.
 #include "bsdf/energy.glsl"
+#include "bsdf/lobes/base/film.glsl"
 #include "bsdf/lobes/base/pane.glsl"
 #include "bsdf/lobes/base/multiscatter.glsl"
 #include "bsdf/lobes/base/specular.glsl"
+#include "bsdf/lobes/base/shares.glsl"
 #include "bsdf/lobes/base/base.glsl"
 #include "bsdf/lobes/openpbr/metal.glsl"
 #include "bsdf/lobes/openpbr/diffuse.glsl"
@@ -72,6 +74,17 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
     s.index_matched = s.eta_outside < 1.0001;
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
+#if HAS_FILM
+    film_surface(m, s);
+    if (s.film > 0.0) {
+#if HAS_CLEARCOAT
+        s.film_outer = mix(1.0, max(m.coat_ior, 1.0), m.clearcoat * (1.0 - s.transmission));
+#endif
+        bool below = s.turned_out || m.ior < s.film_outer;
+        s.film_base = s.film_outer * (below ? 1.0 / s.eta_outside : s.eta_outside);
+        film_metal_index(s.specular_weight * s.base_color, s.specular_color, s.film_outer, s);
+    }
+#endif
     s.is_delta = roughness < LEAST_ROUGHNESS;
 #if HAS_THIN_WALLS
     s.is_thin = m.thin_walled > 0.0;
@@ -106,15 +119,15 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
 }
 
 // The reflectance of the dielectric with the model's colour, which light from inside does not see.
-vec3 openpbr_tinted(Surface s, float f) { return s.bare ? vec3(f) : f * s.specular_color; }
+vec3 openpbr_tinted(Surface s, BASE_SHARE f) { return s.bare ? vec3(f) : f * s.specular_color; }
 
 #if HAS_CLEARCOAT
 // The albedo of the base head-on and its roughness, as the coat's darkening wants them.
 vec3 openpbr_base_albedo(Surface s, out float roughness) {
-    float f = base_dielectric(s, 1.0, s.eta_outside);
+    BASE_SHARE f = base_dielectric(s, 1.0, s.eta_outside);
     vec3 dielectric = f * s.specular_color + (1.0 - f) * mix(s.base_color, s.clear_color, s.transmission);
-    roughness = mix(mix(1.0, s.roughness, f), s.roughness, s.metallic);
-    return mix(dielectric, openpbr_metal(s, 1.0), s.metallic);
+    roughness = mix(mix(1.0, s.roughness, base_grey(f)), s.roughness, s.metallic);
+    return mix(dielectric, base_metal(s, 1.0), s.metallic);
 }
 #endif
 
@@ -130,8 +143,7 @@ bool openpbr_is_bare(Surface s, bool behind) {
 void openpbr_face(vec3 wo, bool behind, inout Surface s) {
     s.bare = openpbr_is_bare(s, behind);
     base_side(behind != s.turned_out, s);
-    s.albedo = base_albedo(s, wo);
-    s.albedo_mean = base_albedo_mean(s);
+    base_face(wo, s);
     s.coat_albedo = 0.0;
     s.sheen_albedo = 0.0;
 #if HAS_SHEEN
@@ -181,8 +193,7 @@ struct OpenpbrWeights {
 };
 
 OpenpbrWeights openpbr_weights(Surface s, vec3 wo) {
-    float clear = base_clear(s);
-    BaseWeights base = base_weights(s, wo, openpbr_diffuse_weight(s, multiscatter_albedo(s.albedo, clear)));
+    BaseWeights base = base_weights(s, wo, openpbr_diffuse_weight(s, shares_kept(s)));
     OpenpbrWeights w = OpenpbrWeights(base, 0.0, 0.0);
 #if HAS_SHEEN
     w.fuzz = s.bare ? 0.0 : s.fuzz.z * luminance(s.sheen);
@@ -208,10 +219,7 @@ Scatter openpbr_eval(Surface s, vec3 wo, vec3 wi) {
     }
 #endif
     vec3 wm = normalize(wo + wi);
-    float clear = base_clear(s);
-    vec3 diffuse = openpbr_diffuse_eval(s, wo, wi, multiscatter_albedo(s.albedo, clear),
-                                        multiscatter_albedo(albedo_i, clear),
-                                        multiscatter_albedo(s.albedo_mean, clear));
+    vec3 diffuse = openpbr_diffuse_eval(s, wo, wi, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
     Scatter r = base_eval(s, wo, wi, wm, albedo_i, diffuse, w.base);
     r.f *= openpbr_layers(s, wo, wi);
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS

@@ -2,12 +2,14 @@
 // glass. A layer of albedo E leaves 1 - max(E(o), E(i)) of the light to what is under it, which is reciprocal and gains
 // nothing [Kulla & Conty 2017, section 4]. The model departs from the 2012 course notes where those gain or lose light.
 #include "bsdf/energy.glsl"
+#include "bsdf/lobes/base/film.glsl"
 #include "bsdf/lobes/principled/diffuse.glsl"
 #include "bsdf/lobes/principled/sheen_charlie.glsl"
 #include "bsdf/lobes/principled/clearcoat.glsl"
 #include "bsdf/lobes/base/pane.glsl"
 #include "bsdf/lobes/base/multiscatter.glsl"
 #include "bsdf/lobes/base/specular.glsl"
+#include "bsdf/lobes/base/shares.glsl"
 #include "bsdf/lobes/base/base.glsl"
 
 #if HAS_PRINCIPLED
@@ -34,6 +36,16 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.pane_narrowing = pane_narrowing(s.eta_outside);
     s.diffuse_transmission = s.is_thin ? m.diffuse_transmission : 0.0;
     s.diffuse_through = m.diffuse_transmission_color.x >= 0.0 ? m.diffuse_transmission_color : m.base_color;
+#endif
+#if HAS_FILM
+    film_surface(m, s);
+    if (s.film > 0.0) film_metal_index(s.base_color, vec3(1.0), 1.0, s);
+#if HAS_CONDUCTOR
+    if (m.conductor_eta.x > 0.0) {
+        s.film_eta = m.conductor_eta;
+        s.film_k = m.conductor_k;
+    }
+#endif
 #endif
     s.aspect = 1.0;
 #if HAS_ANISOTROPIC
@@ -67,7 +79,7 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
 }
 
 // The tinted reflectance of the dielectric: the colour multiplies F0, 1 stays 1, and none is above the untinted one.
-vec3 principled_tinted(Surface s, float f) {
+vec3 principled_tinted(Surface s, BASE_SHARE f) {
     float f0 = fresnel_normal(s.eta_outside);
     return max(vec3(0.0), f - (1.0 - s.specular_color) * (f0 / (1.0 - f0) * (1.0 - f)));
 }
@@ -139,21 +151,19 @@ float principled_sheen_albedo(Surface s, float c) {
 // Completes the surface with what depends on wo.
 void principled_face(vec3 wo, bool behind, inout Surface s) {
     base_side(behind, s);
-    s.albedo = base_albedo(s, wo);
-    s.albedo_mean = base_albedo_mean(s);
 #if HAS_CONDUCTOR
     s.metal_mean = principled_conductor_mean(s);
 #endif
+    base_face(wo, s);
     // The layers lie on the outer side only.
     s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
     s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
 }
 
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
-    float clear = base_clear(s);
-    float diffuse = principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear));
+    float diffuse = principled_diffuse_weight(s, shares_kept(s));
 #if HAS_THIN_WALLS
-    float through = s.diffuse_transmission * principled_through_weight(s, multiscatter_albedo(s.albedo, clear));
+    float through = s.diffuse_transmission * principled_through_weight(s, shares_kept(s));
     BaseWeights base = base_weights(s, wo, (1.0 - s.diffuse_transmission) * diffuse);
     base.diffuse_below += through;
 #else
@@ -185,10 +195,8 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
         bool leaves = s.inside; // into the air, through the layers there
 #if HAS_THIN_WALLS
         leaves = leaves || s.is_thin;
-        float clear = base_clear(s);
-        below.f += LOBE(LOBE_DIFFUSE, principled_through_eval(s, multiscatter_albedo(s.albedo, clear),
-                                                              multiscatter_albedo(albedo_i, clear),
-                                                              multiscatter_albedo(s.albedo_mean, clear)));
+        below.f += LOBE(LOBE_DIFFUSE, principled_through_eval(s, shares_kept(s), shares_kept(s, wi, albedo_i),
+                                                              shares_kept_mean(s)));
 #endif
         float coat_i = leaves ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
         float sheen_i = leaves ? principled_sheen_albedo(s, wi.z) : 0.0;
@@ -197,10 +205,8 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     }
 #endif
     vec3 wm = normalize(wo + wi);
-    float cos_d = dot(wo, wm), clear = base_clear(s);
-    vec3 diffuse = principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
-                                           multiscatter_albedo(albedo_i, clear),
-                                           multiscatter_albedo(s.albedo_mean, clear));
+    float cos_d = dot(wo, wm);
+    vec3 diffuse = principled_diffuse_eval(s, wo.z, wi.z, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
 #if HAS_THIN_WALLS
     diffuse *= 1.0 - s.diffuse_transmission;
 #endif

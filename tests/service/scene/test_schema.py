@@ -15,7 +15,7 @@ from service.scene import parse_scene, parse_settings, schema
 from service.scene.base import Group
 
 WHOLE = schema()
-UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "cd/m^2", "s", "pixels"}
+UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "cd/m^2", "s", "pixels", "nm", "um"}
 WIDGETS = {"slider", "color", "number", "angle"}
 
 

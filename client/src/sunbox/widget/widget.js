@@ -19,7 +19,7 @@ const isBeingEdited = (input) => document.activeElement === input && input.datas
 return { beginIds, element, freshId, isBeingEdited };
 })();
 const lib_format_text = (() => {
-const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²", "cd/m^2": "cd/m²" };
+const UNITS = { degrees: "°", um: "µm", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²", "cd/m^2": "cd/m²" };
 const NAMES={
 aces: "ACES",
 aces2: "ACES 2",

@@ -1,5 +1,6 @@
 // A base that mixes metal, a diffuse material under a dielectric, and glass, without the layers on it. What its model
-// decides are the reflectances: models_metal, models_metal_mean and models_tinted, and the Surface's clear_color.
+// decides are the reflectances: models_metal, models_metal_mean and models_tinted, and the Surface's clear_color. What
+// lies on the boundary is known to base_dielectric and base_metal, and to shares.glsl.
 #if ANY_NEEDS_TABLES
 // What the facets of the tables' last index reflect and lose, as those of a greater one do: the share `excess` of the
 // light that meets a facet is reflected whatever the angle.
@@ -25,9 +26,6 @@ vec4 base_albedo_mean(Surface s) {
 #endif
 }
 
-// The mean of base_dielectric seen from outside.
-float base_dielectric_mean(Surface s) { return mix(fresnel_mean(s.eta_outside), 1.0, s.excess); }
-
 // Sets what depends on the side that the surface is seen from; `behind` is the inner side of its geometry.
 void base_side(bool behind, inout Surface s) {
 #if HAS_TRANSMISSION
@@ -42,12 +40,12 @@ void base_side(bool behind, inout Surface s) {
 #endif
 }
 
-// The share of untinted light that comes back after all of what the facets of the dielectric lose.
-float base_clear(Surface s) { return multiscatter_fresnel(base_dielectric_mean(s), s.albedo_mean.x); }
+// Sets what depends on wo.
+void base_face(vec3 wo, inout Surface s) { shares_face(wo, base_albedo(s, wo), base_albedo_mean(s), s); }
 
 // The share that comes back of the light that single scattering loses between microfacets of the mixed base.
 vec3 base_multiscatter(Surface s) {
-    vec3 metal = multiscatter_fresnel(models_metal_mean(s), s.albedo_mean.x);
+    vec3 metal = multiscatter_fresnel(base_metal_mean(s), s.albedo_mean.x);
     vec3 tinted = multiscatter_fresnel(models_tinted(s, base_dielectric_mean(s)), s.albedo_mean.x);
     return mix(tinted * (1.0 - s.transmission), metal, s.metallic);
 }
@@ -73,7 +71,7 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
     specular += luminance(base_transmittance(s, wo.z));
     if (multiscatter_glass(s)) {
         float glass = (1.0 - s.metallic) * s.transmission;
-        float t = multiscatter_transmit_chance(s), lost = glass * multiscatter_near(s, s.albedo);
+        float t = base_grey(multiscatter_transmit_chance(s)), lost = glass * base_grey(shares_lost(s));
         w.diffuse += lost * (1.0 - t);
         w.diffuse_below = lost * t * luminance(s.clear_color);
         specular *= 1.0 - lost;
@@ -98,7 +96,7 @@ Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BaseWeights 
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
 #endif
     vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
-    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, albedo_i));
+    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, shares_lost(s), shares_lost(s, wi, albedo_i, !s.inside)));
     float pdf = w.diffuse_below * INV_PI * -wi.z;
 #if HAS_THIN_WALLS
     if (s.is_thin) {
@@ -129,7 +127,11 @@ Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, vec3 diff
     wm_t = bsdf_turn(s, wm);
 #endif
     vec3 f = LOBE(LOBE_DIFFUSE, diffuse);
-    f += LOBE(LOBE_MULTISCATTER, multiscatter_reflect(s, albedo_i, base_multiscatter(s)));
+    vec3 again = multiscatter_reflect(s, albedo_i, base_multiscatter(s));
+#if HAS_TRANSMISSION
+    again += multiscatter_beside(s, shares_lost(s), shares_lost(s, wi, albedo_i, s.inside));
+#endif
+    f += LOBE(LOBE_MULTISCATTER, again);
     float pdf = w.diffuse * INV_PI * wi.z;
     if (!s.is_delta) {
         f += LOBE(LOBE_SPECULAR, base_reflect(s, wo_t, wi_t, wm_t, cos_d));
@@ -163,6 +165,9 @@ LobeSample base_sample_facet(Surface s, vec3 wo, float v, vec2 u, float weight) 
 // with a chance of at least `least`. Sets the members that path_extend reads.
 LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     base_side(behind, s);
+#if HAS_FILM
+    s.film_cosine = wo.z;
+#endif
     float chance = base_reflect_chance(s, wo.z);
 #if HAS_TRANSMISSION
     if (chance > 0.0 && chance < 1.0) chance = clamp(chance, least, 1.0 - least);

@@ -2,7 +2,10 @@
 // reflected to and fro: of two faces of reflectance R a pane reflects 2 R / (1 + R), and passes (1 - R) / (1 + R), which
 // its colour tints once. The pane is the same from both sides, and the index is that of wo's side on both.
 #if ANY_NEEDS_TABLES && HAS_THIN_WALLS
-float base_dielectric(Surface s, float c, float eta); // bsdf/lobes/base/specular.glsl
+BASE_SHARE base_dielectric(Surface s, float c, float eta); // bsdf/lobes/base/specular.glsl
+BASE_SHARE base_dielectric_mean(Surface s);
+BASE_SHARE shares_once(Surface s, vec3 w, vec4 albedo); // bsdf/lobes/base/shares.glsl
+BASE_SHARE shares_once(Surface s);
 vec3 base_fresnel(Surface s, float c);
 
 // What goes through bends at two rough faces, which turn it by (eta - 1) times the difference of their slopes where a
@@ -25,9 +28,13 @@ vec3 pane_of(vec3 r) { return 2.0 * r / (1.0 + r); }
 // The share that the rough pane reflects, from two of base_albedo's shares: never too low, as 2 F / (1 + F) is concave.
 float pane_reflected(vec4 albedo) { return 2.0 * albedo.x * albedo.y / max(albedo.x + albedo.y, 1e-6); }
 
+vec3 pane_reflected(float one, vec3 once) { return 2.0 * one * once / max(one + once, 1e-6); }
+float pane_reflected(float one, float once) { return pane_reflected(vec4(one, once, 0.0, 0.0)); }
+
 // The same of the pane seen from wo, or of the smooth one, which has no table.
-float pane_reflected(Surface s, float c) {
-    return s.is_delta ? pane_of(base_dielectric(s, c, s.eta_outside)) : pane_reflected(s.albedo);
+BASE_SHARE pane_reflected(Surface s, float c) {
+    if (s.is_delta) return pane_of(base_dielectric(s, c, s.eta_outside));
+    return pane_reflected(s.albedo.x, shares_once(s));
 }
 
 // What else gets lost in a rough pane: pane_reflected is too high, and light that goes through pays for the more
@@ -66,11 +73,11 @@ vec4 pane_albedo_mean(Surface s, vec4 mean) {
 }
 
 // The chance that light which is lost between the facets leaves on the other side, from either.
-float pane_multiscatter_chance(Surface s) { return 1.0 - pane_of(mix(fresnel_mean(s.eta_outside), 1.0, s.excess)); }
+BASE_SHARE pane_multiscatter_chance(Surface s) { return 1.0 - pane_of(base_dielectric_mean(s)); }
 
 // What goes through by single scattering, of light that comes from one side at a share `reflected` and leaves at
 // another: the greater one decides, which is reciprocal and gains nothing.
-vec3 pane_transmittance(Surface s, float reflected) {
+vec3 pane_transmittance(Surface s, BASE_SHARE reflected) {
     return (1.0 - s.metallic) * s.transmission * (1.0 - reflected) * s.clear_color;
 }
 
@@ -93,7 +100,8 @@ Scatter pane_eval(Surface s, vec3 wo_t, vec3 image_t, vec4 albedo_i, float weigh
     if (s.is_delta || s.index_matched || s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
     vec2 alpha = pane_alpha(s);
     vec3 wm = normalize(wo_t + image_t);
-    float reflected = max(pane_reflected(s.albedo), pane_reflected(albedo_i));
+    BASE_SHARE there = pane_reflected(albedo_i.x, shares_once(s, image_t, albedo_i));
+    BASE_SHARE reflected = max(pane_reflected(s.albedo.x, shares_once(s)), there);
     vec3 f = pane_transmittance(s, reflected) * (ggx_d(wm, alpha) * ggx_visibility(wo_t, image_t, alpha));
     return Scatter(f, weight * (1.0 - pane_reflect_chance(s, wo_t.z)) * ggx_visible_pdf(wo_t, wm, alpha));
 }

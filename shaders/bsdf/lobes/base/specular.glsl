@@ -3,8 +3,28 @@
 // multiplies it back.
 #if ANY_NEEDS_TABLES
 
-// The dielectric's untinted reflectance at cosine c.
-float base_dielectric(Surface s, float c, float eta) { return mix(fresnel_dielectric(c, eta), 1.0, s.excess); }
+// The dielectric's untinted reflectance at cosine c, without and with what lies on it.
+float base_bare(Surface s, float c, float eta) { return mix(fresnel_dielectric(c, eta), 1.0, s.excess); }
+
+BASE_SHARE base_dielectric(Surface s, float c, float eta) {
+    float bare = base_bare(s, c, eta);
+#if HAS_FILM
+    if (s.film > 0.0) {
+        vec3 film = film_dielectric(s, film_sine2(s, c, eta));
+        return mix(vec3(bare), mix(film, vec3(1.0), s.excess), s.film);
+    }
+#endif
+    return BASE_SHARE(bare);
+}
+
+// The metal's reflectance at cosine c.
+vec3 base_metal(Surface s, float c) {
+    vec3 f = models_metal(s, c);
+#if HAS_FILM
+    if (s.film > 0.0) f = mix(f, film_metal(s, c), s.film);
+#endif
+    return f;
+}
 
 vec3 base_fresnel(Surface s, float c) {
     vec3 clear = models_tinted(s, base_dielectric(s, c, s.eta_outside));
@@ -14,12 +34,23 @@ vec3 base_fresnel(Surface s, float c) {
 #elif HAS_TRANSMISSION
     clear = mix(clear, models_tinted(s, base_dielectric(s, c, s.eta)), s.transmission);
 #endif
-    return mix(clear, models_metal(s, c), s.metallic);
+    return mix(clear, base_metal(s, c), s.metallic);
 }
 
 vec3 base_transmittance(Surface s, float c) {
+#if HAS_FILM
+    // What passes straight through a film of rough facets is what they do not reflect in all.
+    if (s.index_matched && !s.is_delta) {
+        vec3 kept = s.film_kept;
 #if HAS_THIN_WALLS
-    float r = s.is_thin ? pane_of(base_dielectric(s, c, s.eta_outside)) : base_dielectric(s, c, s.eta);
+        if (s.is_thin) kept = pane_reflected(s.albedo.x, s.film_once);
+#endif
+        return (1.0 - s.metallic) * s.transmission * (1.0 - kept) * s.clear_color;
+    }
+#endif
+#if HAS_THIN_WALLS
+    BASE_SHARE r = base_dielectric(s, c, s.is_thin ? s.eta_outside : s.eta);
+    if (s.is_thin) r = pane_of(r);
     return (1.0 - s.metallic) * s.transmission * (1.0 - r) * s.clear_color;
 #endif
     return (1.0 - s.metallic) * s.transmission * (1.0 - base_dielectric(s, c, s.eta)) * s.clear_color;
@@ -28,11 +59,19 @@ vec3 base_transmittance(Surface s, float c) {
 // The chance of reflecting rather than refracting at a facet that light hits at cosine c.
 float base_reflect_chance(Surface s, float c) {
 #if HAS_TRANSMISSION
+#if HAS_FILM
+    if (s.index_matched) c = s.film_cosine;
+#else
     if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
+#endif
 #if HAS_THIN_WALLS
     if (s.is_thin) return pane_reflect_chance(s, c);
 #endif
     float r = luminance(base_fresnel(s, c)), t = luminance(base_transmittance(s, c));
+#if HAS_FILM
+    // A film on nothing may reflect nothing for wo and much at its facets.
+    if (s.index_matched && s.film > 0.0 && t > 0.0) return clamp(r / (r + t), 0.05, 0.95);
+#endif
     return t > 0.0 ? r / (r + t) : 1.0;
 #else
     return 1.0;

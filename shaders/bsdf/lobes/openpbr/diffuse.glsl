@@ -17,21 +17,22 @@ float openpbr_diffuse_lost(float c, float r) {
 }
 
 // The cosine-weighted mean of what both the boundary and single scattering leave over, by Gauss's rule.
-float openpbr_diffuse_lost_mean(Surface s, float clear) {
+BASE_SHARE openpbr_diffuse_lost_mean(Surface s) {
     const vec3 c = vec3(0.2123405382, 0.5905331356, 0.9114120405);
     const vec3 weight = vec3(0.1396539598, 0.4584822128, 0.4018638274);
-    float sum = 0.0;
+    BASE_SHARE sum = BASE_SHARE(0.0);
     for (int i = 0; i < 3; i++) {
-        vec4 albedo = base_albedo(s, vec3(sqrt(0.5 * (1.0 - c[i] * c[i])) * vec2(1.0), c[i]));
-        sum += weight[i] * openpbr_diffuse_lost(c[i], s.diffuse_roughness) * (1.0 - multiscatter_albedo(albedo, clear));
+        vec3 w = vec3(sqrt(0.5 * (1.0 - c[i] * c[i])) * vec2(1.0), c[i]);
+        sum += weight[i] * openpbr_diffuse_lost(c[i], s.diffuse_roughness) * (1.0 - shares_kept(s, w, base_albedo(s, w)));
     }
     return sum;
 }
 #endif
 
-vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, float albedo_o, float albedo_i, float albedo_mean) {
-    float passed_o = 1.0 - albedo_o, passed_i = 1.0 - albedo_i;
-    float even = passed_o * passed_i / max(1.0 - albedo_mean, 1e-6);
+vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, BASE_SHARE albedo_o, BASE_SHARE albedo_i,
+                          BASE_SHARE albedo_mean) {
+    BASE_SHARE passed_o = 1.0 - albedo_o, passed_i = 1.0 - albedo_i;
+    BASE_SHARE even = passed_o * passed_i / max(1.0 - albedo_mean, 1e-6);
     vec3 f = even * s.base_color;
 #if HAS_DIFFUSE_ROUGHNESS
     float r = s.diffuse_roughness;
@@ -39,9 +40,9 @@ vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, float albedo_o, float alb
         float a = 1.0 / (1.0 + EON_SLOPE * r), mean = a * (1.0 + EON_MEAN * r);
         float side = dot(wo.xy, wi.xy);
         // The part that depends on the azimuth keeps below what the boundary passes, in either direction.
-        float apart = side * (side > 0.0 ? 1.0 / max(wo.z, wi.z) : 1.0) * min(min(passed_o, passed_i), even);
-        float lost_o = openpbr_diffuse_lost(wo.z, r) * passed_o, lost_i = openpbr_diffuse_lost(wi.z, r) * passed_i;
-        float lost = lost_o * lost_i / max(openpbr_diffuse_lost_mean(s, base_clear(s)), 1e-6);
+        BASE_SHARE apart = side * (side > 0.0 ? 1.0 / max(wo.z, wi.z) : 1.0) * min(min(passed_o, passed_i), even);
+        BASE_SHARE lost_o = openpbr_diffuse_lost(wo.z, r) * passed_o, lost_i = openpbr_diffuse_lost(wi.z, r) * passed_i;
+        BASE_SHARE lost = lost_o * lost_i / max(openpbr_diffuse_lost_mean(s), 1e-6);
         vec3 more = s.base_color * s.base_color * mean / (1.0 - s.base_color * (1.0 - mean)); // colour of several scatterings
         f = s.base_color * (a * (even + r * apart)) + more * lost;
     }
@@ -49,7 +50,7 @@ vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, float albedo_o, float alb
     return openpbr_diffuse_share(s) * INV_PI * f;
 }
 
-float openpbr_diffuse_weight(Surface s, float albedo_o) {
-    return openpbr_diffuse_share(s) * luminance(s.base_color) * (1.0 - albedo_o);
+float openpbr_diffuse_weight(Surface s, BASE_SHARE albedo_o) {
+    return openpbr_diffuse_share(s) * luminance(s.base_color) * (1.0 - base_grey(albedo_o));
 }
 #endif

@@ -6,8 +6,9 @@
 // The albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).
 float principled_diffuse_seeliger(float c) { return c > 0.0 ? 1.0 - c * log(1.0 + 1.0 / c) : 1.0; }
 
-vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, float albedo_o, float albedo_i, float albedo_mean) {
-    float f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
+vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, BASE_SHARE albedo_o, BASE_SHARE albedo_i,
+                             BASE_SHARE albedo_mean) {
+    BASE_SHARE f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
 #if HAS_SUBSURFACE
     // Single scattering of a half-space, brought to an albedo of 1 at every angle as Kulla & Conty do for microfacets.
     const float mean = 0.409137; // of principled_diffuse_seeliger, cosine-weighted: 4/3 - 4/3 ln 2
@@ -20,17 +21,17 @@ vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, float albedo_o
 
 #if HAS_THIN_WALLS
 // Of light that the inside of a thin wall scatters to its other side, whose boundary it passes, too.
-vec3 principled_through_eval(Surface s, float albedo_o, float albedo_i, float albedo_mean) {
-    float f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
+vec3 principled_through_eval(Surface s, BASE_SHARE albedo_o, BASE_SHARE albedo_i, BASE_SHARE albedo_mean) {
+    BASE_SHARE f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
     return (1.0 - s.metallic) * (1.0 - s.transmission) * s.diffuse_transmission * INV_PI * f * s.diffuse_through;
 }
 
-float principled_through_weight(Surface s, float albedo_o) {
-    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.diffuse_through) * (1.0 - albedo_o);
+float principled_through_weight(Surface s, BASE_SHARE albedo_o) {
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.diffuse_through) * (1.0 - base_grey(albedo_o));
 }
 #endif
 
-float principled_diffuse_weight(Surface s, float albedo_o) {
-    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.base_color) * (1.0 - albedo_o);
+float principled_diffuse_weight(Surface s, BASE_SHARE albedo_o) {
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.base_color) * (1.0 - base_grey(albedo_o));
 }
 #endif
