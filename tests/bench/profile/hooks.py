@@ -37,7 +37,7 @@ def _ray(kind: str) -> str:
 HOOKS = (
     Edit("pathtrace.comp", "    uvec2 pixel;", "    profile_begin();"),
     Edit("pathtrace.comp", "    sums[slot] = sum;", "    profile_end();"),
-    Edit("path/path.glsl", "Surface s = interaction_surface(here, m);", _event("bounce")),
+    Edit("path/path.glsl", "Surface s = interaction_surface(here, hues_leading(m, path.hues));", _event("bounce")),
     Edit("path/direct.glsl", "LightSample light = lights_sample(", _event("light")),
     Edit("path/direct.glsl", "uvec2 skip = uvec2(terminator_skip(at, light.wi), light.id);", _ray("shadow")),
     Edit("path/delta_chain.glsl", "delta_chain_step(here, m, rng, path);", _event("mirror")),
