@@ -26,6 +26,7 @@ SAME = {
     "specular_ior": 1.5, "transmission_weight": 0.0, "transmission_color": 1.0, "coat_weight": 0.0, "coat_color": 1.0,
     "coat_roughness": 0.0, "coat_roughness_anisotropy": 0.0, "coat_ior": 1.6, "coat_darkening": 1.0,
     "fuzz_weight": 0.0, "fuzz_color": 1.0, "fuzz_roughness": 0.5, "geometry_opacity": 1.0,
+    "thin_film_weight": 0.0, "thin_film_thickness": 0.5, "thin_film_ior": 1.4,
 }  # fmt: skip
 BELOW = "light does not travel below the surface; the diffuse reflection has its colour"
 NEGLIGIBLE = 0.5  # a coat whose roughness is at most this share of the base's makes that at most 3 % rougher
@@ -82,7 +83,6 @@ def open_pbr_surface(s: Surface) -> None:
         )
     s.lose([
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("thin_film_weight", 0, FILM),
     ])  # fmt: skip
 
 

@@ -20,6 +20,7 @@ BRIGHTEST = 1e6
 RANGES = {
     "ior": (1.0, 4.0), "attenuation_distance": (1e-9, 1e9), "anisotropic_rotation": (-1e9, 1e9),
     "specular_weight": (0.0, BRIGHTEST), "specular_ior": (1e-3, 1e3), "coat_ior": (1e-3, 1e3),
+    "thin_film_ior": (1e-3, 1e3), "thin_film_thickness": (0.0, BRIGHTEST),
     "emission_luminance": (0.0, 1e9),
 }  # fmt: skip
 COLORS = (

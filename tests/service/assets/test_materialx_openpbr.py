@@ -43,7 +43,7 @@ def test_open_pbr_is_openpbr_without_a_loss(store: AssetStore) -> None:
 def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
     unsupported = [
         value("subsurface_weight", 0.5), value("subsurface_color", 0, "color3").replace('"0"', '"0, 0, 0"'),
-        value("base_color", [0.8, 0.4, 0.2]), value("thin_film_weight", 1),
+        value("base_color", [0.8, 0.4, 0.2]),
         value("geometry_tangent", "1, 0, 0", "vector3"),
         value("transmission_scatter", [0.1, 0.2, 0.3]),
     ]  # fmt: skip
@@ -51,7 +51,7 @@ def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
     assert material(imported) == {"type": "openpbr", "base_color": pytest.approx([0.4, 0.2, 0.1])}
     assert losses(imported) == {
         f"SM/{name}" for name in (
-            "subsurface_weight", "thin_film_weight", "geometry_tangent",
+            "subsurface_weight", "geometry_tangent",
             "transmission_scatter",
         )
     }  # fmt: skip
@@ -103,3 +103,10 @@ def test_thin_walls(store: AssetStore) -> None:
     ]
     found = material(taken(store, mtlx(surface("standard_surface", *leaf))))
     assert (found["type"], found["diffuse_transmission"]) == ("principled", pytest.approx(0.4))
+
+
+def test_a_thin_film_comes_along(store: AssetStore) -> None:
+    film = {"thin_film_weight": 0.5, "thin_film_thickness": 0.35, "thin_film_ior": 2.2}
+    imported = taken(store, mtlx(surface("open_pbr_surface", *(value(name, x) for name, x in film.items()))))
+    assert material(imported) == {"type": "openpbr", **{name: pytest.approx(x) for name, x in film.items()}}
+    assert not imported.warnings
