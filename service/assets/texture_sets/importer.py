@@ -15,6 +15,7 @@ from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.warnings import Warnings
 from service.assets.texture_sets.baking import inverted, turned
 from service.assets.texture_sets.names import Role
+from service.assets.texture_sets.real_size import Size, by_names, by_note
 from service.assets.texture_sets.sets import Source, TextureSet, texture_sets
 from service.assets.types import AssetLimits, SceneFile
 
@@ -34,7 +35,9 @@ CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
     """The materials of a zip, each a `principled`. Raises ParseError."""
     notes, files = Warnings(), PartFiles()
-    images = {path: data for path in archive.names if (data := _image(archive, path, notes)) is not None}
+    note = by_note(archive)
+    others = [path for path in archive.names if note is None or path != note[0]]
+    images = {path: data for path in others if (data := _image(archive, path, notes)) is not None}
     sets = texture_sets(images, notes)
     if not sets:
         raise ParseError(
@@ -44,7 +47,15 @@ def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
     textures = _Textures(images, files, limits)
-    materials = {name: _material(each, textures, notes) for name, each in sets.items()}
+    materials = {}
+    for name, each in sets.items():
+        paths = [source.path for source in each.sources.values()]
+        textures.size = note[1] if note and len(sets) == 1 else by_names(paths)
+        materials[name] = _material(each, textures, notes)
+        if textures.size:
+            width, height = textures.size
+            shown = f"they show {width:g} x {height:g} m, and repeat so for texture coordinates in metres"
+            notes.add(note[0] if note and len(sets) == 1 else paths[0], shown)
     document = {
         "version": 1, "camera": CAMERA, "materials": materials, "textures": textures.documents, "shapes": [],
     }  # fmt: skip
@@ -67,6 +78,7 @@ class _Textures:
     images: dict[str, bytes]
     files: PartFiles
     limits: AssetLimits
+    size: Size | None = None  # of what the images of the present material show
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
     _names: dict[tuple[str, str, str], str] = field(default_factory=dict)
 
@@ -87,7 +99,8 @@ class _Textures:
             stem = posixpath.splitext(posixpath.basename(source.path))[0]
             name = unique(f"{stem} as roughness" if role == "gloss" else stem, self.documents)
             asset = self.files.add(data, source.path)
-            self.documents[name] = {"asset": asset, "color_space": space}
+            scale = {"scale": [float(f"{1 / side:.6g}") for side in self.size]} if self.size else {}
+            self.documents[name] = {"asset": asset, "color_space": space, **scale}
             self._names[key] = name
         return self._names[key]
 

@@ -197,6 +197,27 @@ def test_materials_are_parted_by_what_their_names_share_and_what_is_not_taken_is
     assert imported.document["materials"]["oak"]["height"]["scale"] == 0.02
 
 
+@pytest.mark.parametrize(
+    ("stem", "note", "scale"),
+    [
+        ("Plaster_200x250cm_2K", None, [0.5, 0.4]),
+        ("Plaster_2.5x2m", None, [0.4, 0.5]),
+        ("Plaster_2x2_1024x1024", None, None),
+        ("Plaster_0x2m", None, None),
+        ("vglkdeh_4K", {"physicalSize": "2x4"}, [0.5, 0.25]),
+        ("vglkdeh_4K", {"meta": [{"key": "scanArea", "value": "2 x 4 m"}, 3]}, [0.5, 0.25]),
+        ("vglkdeh_4K", {"physicalSize": "large", "meta": 3}, None),
+        ("vglkdeh_4K", [["physicalSize", "2x4"]], None),
+    ],
+)
+def test_real_sizes_become_scales(store: AssetStore, stem: str, note: Any, scale: list[float] | None) -> None:
+    notes = {} if note is None else {"set/vglkdeh.json": json.dumps(note).encode()}
+    files = {f"set/{stem}_Color.png": make.png(COLOR), f"set/{stem}_Roughness.png": make.png(GREY)}
+    document = added(store, files | notes)
+    assert len(document["textures"]) == 2
+    assert all(each.get("scale") == scale for each in document["textures"].values())
+
+
 def test_a_zip_without_such_images_is_refused(store: AssetStore) -> None:
     with pytest.raises(AssetError, match="no images whose names say what they are"):
         store.add(zipped({"IMG_1.png": make.png(COLOR)}))
