@@ -110,8 +110,13 @@ def _ordered(modules: dict[str, Module], path: str, seen: set[str] | None = None
 
 
 def _tight(line: str) -> str:
-    """Without spaces beside what needs none; a line that may hold a text or a pattern stays as it is."""
-    return line if re.search(r"[\"'`/]", line) else re.sub(r"\s*(=>|[={}(),;:<>|&])\s*", r"\1", line)
+    """Without spaces beside what needs none, outside of texts; a line that may hold a pattern or a text with other
+    quotes stays as it is."""
+    if re.search(r"['`/]", line):
+        return line
+    parts = re.split(r'("(?:[^"\\]|\\.)*")', line)  # every second one is a text
+    parts[::2] = [re.sub(r"\s*(=>|[={}(),;:<>|&])\s*", r"\1", part) for part in parts[::2]]
+    return "".join(parts)
 
 
 def _variable(path: str) -> str:

@@ -66,6 +66,6 @@ ENERGY_TEXTURES = {
     "mean": 3,
     "sheen": 4,
     "fuzz": 7,
-    "facets": 15,
+    "facets": 16,  # OpenGL promises 16 units; drivers have 32
 }  # of gpu.tables.energy
 TEXELS_A_ROW = 8192  # width of the textures that hold one long row of values, cut into rows

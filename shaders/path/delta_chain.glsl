@@ -3,8 +3,13 @@
 
 #if HAS_MIRRORS
 // The least chance that the surface that the camera sees is followed by reflection, and by refraction. By their light
-// alone a lamp in clear glass is picked one time in 25, and is a cluster of white dots.
+// alone a lamp in clear glass is picked one time in 25, and is a cluster of white dots. Where no lamp can be seen, the
+// chances are those of the light, which is less noise where both sides are about as bright.
+#if HAS_EMISSION || HAS_SUN || HAS_SUN_DISKS
 const float DELTA_GLINT = 1.0 / 3.0;
+#else
+const float DELTA_GLINT = 0.0;
+#endif
 
 // Scatters as bsdf_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {

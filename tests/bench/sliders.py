@@ -70,7 +70,7 @@ def _models(scene: Json, ending: str) -> dict[str, Json]:
 
 def _of(scene: Json, model: Json, values: Json, path: tuple[str | int, ...]) -> Iterator[Slider]:
     for name, node in model["properties"].items():
-        if isinstance(values.get(name), dict):  # a texture
+        if isinstance(values.get(name), dict) or "x-beside" in node:  # a texture, or no value by itself
             continue
         nodes = [node, *node.get("anyOf", [])]
         number = next((n for n in nodes if n.get("type") == "number"), None)

@@ -61,3 +61,9 @@ export function removed({ scene, chosen, compare }, name, instead) {
 export function isShared({ scene }, thing) {
   return isShape(thing) && users(scene, at(scene, thing)?.material).length > 1;
 }
+
+// The material with a value that stands only beside that of `partner`, a field: both come, and go, together.
+export function paired(material, name, value, partner) {
+  const { [name]: old, [partner.name]: other = partner.example, ...rest } = material;
+  return (value ?? null) === null ? rest : { ...rest, [name]: value, [partner.name]: other };
+}

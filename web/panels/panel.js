@@ -2,6 +2,7 @@
 // what the hand does into edits; it keeps nothing itself.
 
 import { DISPLAY } from "../document/picture-view.js";
+import { paired } from "../document/materials.js";
 import { showEditing } from "./editing.js";
 import { fillPicker } from "../forms/library.js";
 import { LookTable } from "./look-table.js";
@@ -85,7 +86,10 @@ export class Panel {
   #edit(chosen, place, name, value) {
     const isLeader =
       value !== undefined && chosen.some(({ ranges, used }) => ranges?.field === name || used?.field === name);
-    if (isLeader) this.acts.choose(place, name, value, chosen);
+    const { beside } = chosen.find((field) => field.name === name);
+    const partner = chosen.find((field) => field.name === beside);
+    if (partner) this.acts.edit(place, paired(this.acts.material, name, value, partner), `${place}/${name}`);
+    else if (isLeader) this.acts.choose(place, name, value, chosen);
     else this.acts.edit(`${place}/${name}`, value);
   }
 

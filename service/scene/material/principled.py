@@ -192,6 +192,7 @@ class PrincipledMaterial(DisneyMaterial):
             unit="",
             widget="number",
             absent="by base colour",
+            beside="conductor_k",
             example=[0.18, 0.42, 1.37],
         ),
     ] = None
@@ -205,6 +206,7 @@ class PrincipledMaterial(DisneyMaterial):
             unit="",
             widget="number",
             absent="by base colour",
+            beside="conductor_eta",
             example=[3.42, 2.35, 1.77],
         ),
     ] = None

@@ -8,37 +8,37 @@ counter=at;
 function element(tag,attributes={},...children){
 const node=document.createElement(tag);
 for(const [name,value] of Object.entries(attributes)){
-if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
-else if (typeof value === "boolean") node.toggleAttribute(name, value);
+if(name.startsWith("on"))node.addEventListener(name.slice(2),value);
+else if(typeof value==="boolean")node.toggleAttribute(name,value);
 else if(value !==undefined)node.setAttribute(name,value);
 }
 node.append(...children.filter((child)=>child !==null&&child !==undefined));
 return node;
 }
-const isBeingEdited = (input) => document.activeElement === input && input.dataset.dirty === "yes";
+const isBeingEdited=(input)=>document.activeElement===input&&input.dataset.dirty==="yes";
 return { beginIds, element, freshId, isBeingEdited };
 })();
 const lib_format_text = (() => {
 const UNITS = { degrees: "°", um: "µm", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²", "cd/m^2": "cd/m²" };
 const NAMES={
-aces: "ACES",
-aces2: "ACES 2",
-agx: "AgX",
-pbr_neutral: "PBR neutral",
-mis: "MIS",
-bsdf: "BSDF",
-blackman_harris: "Blackman\u2013Harris",
-ggx: "GGX",
-gtr: "GTR",
-abc: "ABC",
-sgd: "SGD",
-eon: "EON",
-oren_nayar: "Oren\u2013Nayar",
-cook_torrance: "Cook\u2013Torrance",
-schlick_ggx: "Schlick\u2013GGX",
-color: "Colour",
-shape_id: "Shapes",
-material_id: "Materials",
+aces:"ACES",
+aces2:"ACES 2",
+agx:"AgX",
+pbr_neutral:"PBR neutral",
+mis:"MIS",
+bsdf:"BSDF",
+blackman_harris:"Blackman\u2013Harris",
+ggx:"GGX",
+gtr:"GTR",
+abc:"ABC",
+sgd:"SGD",
+eon:"EON",
+oren_nayar:"Oren\u2013Nayar",
+cook_torrance:"Cook\u2013Torrance",
+schlick_ggx:"Schlick\u2013GGX",
+color:"Colour",
+shape_id:"Shapes",
+material_id:"Materials",
 };
 const unitText=(unit)=>UNITS[unit] ?? unit;
 function inWords(name){
@@ -52,20 +52,20 @@ const compact=(value)=>
 .join(", ");
 const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0%`;
 const amount = (n, thing) => `${count(n)} ${thing}${n === 1 ? "" : "s"}`;
-const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+const count=(n)=>n.toLocaleString("en").replaceAll(",","\u202f");
 return { amount, compact, count, inWords, percent, unitText };
 })();
 const lib_patch = (() => {
-const isObject = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+const isObject=(value)=>value !==null&&typeof value==="object"&&!Array.isArray(value);
 function equal(a,b){
 if(a===b)return true;
-if (a === null || b === null || typeof a !== "object" || typeof b !== "object") return false;
+if(a===null||b===null||typeof a !=="object"||typeof b !=="object")return false;
 if(Array.isArray(a)!==Array.isArray(b))return false;
 const keys=Object.keys(a);
 return keys.length===Object.keys(b).length&&keys.every((key)=>key in b&&equal(a[key],b[key]));
 }
 const changesType=(from,to)=>
-from.type !== to.type && [from.type, to.type].every((kind) => kind === undefined || typeof kind === "string");
+from.type !==to.type&&[from.type,to.type].every((kind)=>kind===undefined||typeof kind==="string");
 function diff(from,to){
 if(from===to)return undefined;
 if(!isObject(from)||!isObject(to)||changesType(from,to))return equal(from,to)? undefined:to;
@@ -110,7 +110,7 @@ return{...resolve(schema,target),...beside};
 const branches=(schema,node)=>{
 const options=node.anyOf ?? node.oneOf;
 return options
-? options.map((option) => resolve(schema, option)).filter((option) => option.type !== "null")
+? options.map((option)=>resolve(schema,option)).filter((option)=>option.type !=="null")
 :[node];
 };
 function property(schema,model,name){
@@ -129,7 +129,7 @@ return found;
 const model=(schema,owner,name)=>
 branches(schema,property(schema,owner,name)).find((node)=>node.properties);
 const materialModels=(schema)=>
-variants(schema, property(schema, schema, "materials").additionalProperties);
+variants(schema,property(schema,schema,"materials").additionalProperties);
 const bound=(nodes,key)=>nodes.map((node)=>node[key]).find((value)=>value !==undefined);
 function step(min,max,whole){
 if(whole)return 1;
@@ -139,35 +139,35 @@ function field(schema,name,raw,required){
 const top=resolve(schema,raw);
 const options=branches(schema,top);
 const nodes=[top,...options];
-const color = bound(nodes, "x-widget") === "color";
-const numeric = options.find((node) => ["number", "integer"].includes(node.type));
+const color=bound(nodes,"x-widget")==="color";
+const numeric=options.find((node)=>["number","integer"].includes(node.type));
 const vector=
 !color&&
-options.find((node) => node.type === "array" && [2, 3].includes(node.maxItems) && node.items?.type === "number");
+options.find((node)=>node.type==="array"&&[2,3].includes(node.maxItems)&&node.items?.type==="number");
 const reference=options.find((node)=>node.properties?.texture);
-const whole = !options.some((node) => node.type === "number");
+const whole=!options.some((node)=>node.type==="number");
 const limits=[top,...(numeric ? [numeric]:[])];
-const choices = bound(nodes, "enum");
-const open = { min: bound(limits, "exclusiveMinimum"), max: bound(limits, "exclusiveMaximum") };
-const min = bound(limits, "minimum") ?? open.min;
-const max = bound(limits, "maximum") ?? open.max;
-const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
-const file = bound(nodes, "x-asset");
+const choices=bound(nodes,"enum");
+const open={min:bound(limits,"exclusiveMinimum"),max:bound(limits,"exclusiveMaximum")};
+const min=bound(limits,"minimum")?? open.min;
+const max=bound(limits,"maximum")?? open.max;
+const soft={min:bound(nodes,"x-soft-minimum")?? min,max:bound(nodes,"x-soft-maximum")?? max};
+const file=bound(nodes,"x-asset");
 const usual=color
 ? "color"
 :vector
 ? "vector"
 :choices
 ? "choice"
-: options.some((node) => node.type === "boolean")
+:options.some((node)=>node.type==="boolean")
 ? "toggle"
 :numeric
-? (bound(nodes, "x-widget") ?? "number")
+?(bound(nodes,"x-widget")?? "number")
 :reference
 ? "texture"
 :null;
-const widget = file ? "file" : usual;
-if (!widget || bound(nodes, "const") !== undefined) return null;
+const widget=file ? "file":usual;
+if(!widget||bound(nodes,"const")!==undefined)return null;
 return{
 name,
 widget,
@@ -181,19 +181,20 @@ takesTexture:reference !==undefined,
 reference,
 length:vector?.maxItems,
 title:top.title ?? name,
-group: bound(nodes, "x-group"),
-hint: bound(nodes, "description") ?? "",
-unit: bound(nodes, "x-unit") ?? "",
+group:bound(nodes,"x-group"),
+hint:bound(nodes,"description")?? "",
+unit:bound(nodes,"x-unit")?? "",
 soft,
 step:step(soft.min,soft.max,whole&&!color),
 whole,
 initial:top.default ?? undefined,
-absent: bound(nodes, "x-absent"),
-follows: bound(nodes, "x-follows"),
-ranges: bound(nodes, "x-ranges"),
-used: bound(nodes, "x-used"),
-example: bound(nodes, "examples")?.[0],
-isPerChannel: Boolean(vector && numeric && bound(nodes, "x-group")),
+absent:bound(nodes,"x-absent"),
+follows:bound(nodes,"x-follows"),
+ranges:bound(nodes,"x-ranges"),
+used:bound(nodes,"x-used"),
+beside:bound(nodes,"x-beside"),
+example:bound(nodes,"examples")?.[0],
+isPerChannel:Boolean(vector&&numeric&&bound(nodes,"x-group")),
 };
 }
 function fields(schema,owner){
@@ -203,7 +204,7 @@ return Object.entries(properties)
 .filter((found)=>found !==null);
 }
 function followed({follows},value){
-if (!follows || typeof value !== "number") return undefined;
+if(!follows||typeof value !=="number")return undefined;
 const{points}=follows;
 const to=Math.max(
 1,
@@ -237,18 +238,18 @@ function ofLuminance(color,luminance){
 const own=color.reduce((sum,x,i)=>sum + LUMINANCE[i] * x,0);
 return color.map((x) => (x * luminance) / own);
 }
-const WORDS = { kelvin: "K", candela: "cd", lumen: "lm", lux: "lx", nit: "nt" };
+const WORDS={kelvin:"K",candela:"cd",lumen:"lm",lux:"lx",nit:"nt"};
 const unitOf=(color)=>Object.keys(WORDS).find((each)=>color?.[each] !==undefined);
 function measureWords(color){
 const unit=unitOf(color);
 return unit ? `${color[unit]} ${WORDS[unit]}` : null;
 }
 function linear(color){
-if (typeof color === "number") return [color, color, color];
+if(typeof color==="number")return [color,color,color];
 const unit=unitOf(color);
-if (unit === "kelvin") return planck(color.kelvin);
+if(unit==="kelvin")return planck(color.kelvin);
 if (unit) return ofLuminance(linear(color.color ?? 1), color[unit] / (unit === "lumen" ? 8583 : 683));
-if (typeof color !== "string") return color;
+if(typeof color !=="string")return color;
 const bits=parseInt(HEX.exec(color)[1],16);
 return [bits >> 16, (bits >> 8) & 255, bits & 255].map((byte) => toLinear(byte / 255));
 }
@@ -260,8 +261,8 @@ const warm=planck(kelvin);
 return warm.map((x) => x / Math.max(...warm));
 }
 const wanted = /^([0-9a-f]{3}|[0-9a-f]{6})$/i.test(plain) ? `#${plain}` : plain;
-const context = new OffscreenCanvas(1, 1).getContext("2d");
-const [found, other] = ["#000000", "#ffffff"].map((before) => {
+const context=new OffscreenCanvas(1,1).getContext("2d");
+const [found,other]=["#000000","#ffffff"].map((before)=>{
 context.fillStyle=before;
 context.fillStyle=wanted;
 return context.fillStyle;
@@ -274,7 +275,7 @@ color
 .map((x)=>
 Math.round(255 * toSrgb(Math.min(Math.max(x,0),1)))
 .toString(16)
-.padStart(2, "0"),
+.padStart(2,"0"),
 )
 .join("");
 return { HEX, hex, linear, measureWords, parseColor, toLinear, toSrgb };
@@ -306,12 +307,12 @@ range.value=String(finger.value);
 },
 {capture:true},
 );
-range.addEventListener("pointerdown", ({ pointerType, pointerId: id, clientX: x, clientY: y }) => {
-if (pointerType !== "touch" || finger) return;
+range.addEventListener("pointerdown",({pointerType,pointerId:id,clientX:x,clientY:y})=>{
+if(pointerType !=="touch"||finger)return;
 const value=range.valueAsNumber;
 finger={id,x,y,from:value,value,isSliding:false,isTap:performance.now()- scrolled>GLIDE_MS};
 });
-range.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
+range.addEventListener("pointermove",({pointerId,clientX,clientY})=>{
 if(pointerId !==finger?.id)return;
 const [right,down]=[Math.abs(clientX - finger.x),Math.abs(clientY - finger.y)];
 if(right>STILL||down>STILL)finger.isTap=false;
@@ -324,12 +325,12 @@ const lift=({pointerId,type})=>{
 if(pointerId !==finger?.id)return;
 const{x,isSliding,isTap}=finger;
 finger=null;
-const isTapped = isTap && type === "pointerup";
+const isTapped=isTap&&type==="pointerup";
 if(isTapped)set(Number(range.min),x - range.getBoundingClientRect().left);
 if(isTapped||isSliding)commit();
 };
-range.addEventListener("pointerup", lift);
-range.addEventListener("pointercancel", lift);
+range.addEventListener("pointerup",lift);
+range.addEventListener("pointercancel",lift);
 }
 return { slideByTouch };
 })();
@@ -342,7 +343,7 @@ s:{ms:0.001,min:60,h:3600},
 pixels:{px:1},
 };
 function tokens(text,unit){
-const factors = { ...UNITS[unit], ...(unit ? { [unit]: 1 } : { "%": 0.01 }) };
+const factors={...UNITS[unit],...(unit ?{[unit]:1}:{"%":0.01})};
 const found=[];
 TOKEN.lastIndex=0;
 while(TOKEN.lastIndex<text.length){
@@ -357,11 +358,11 @@ return found;
 function calculate(rest){
 const factor=()=>{
 const next=rest.shift();
-if (next === "-") return -factor();
-if (next === "+") return factor();
-if (next !== "(") return typeof next === "number" ? next : NaN;
+if(next==="-")return -factor();
+if(next==="+")return factor();
+if(next !=="(")return typeof next==="number" ? next:NaN;
 const inside=sum();
-return rest.shift() === ")" ? inside : NaN;
+return rest.shift()===")" ? inside:NaN;
 };
 const product=()=>{
 let value=factor();
@@ -370,16 +371,16 @@ return value;
 };
 const sum=()=>{
 let value=product();
-while (rest[0] === "+" || rest[0] === "-") value = rest.shift() === "+" ? value + product() : value - product();
+while(rest[0]==="+"||rest[0]==="-")value=rest.shift()==="+" ? value + product():value - product();
 return value;
 };
 const value=sum();
 return rest.length ? NaN:value;
 }
-function parseNumber(text, unit = "") {
-let plain = text.trim().replaceAll("\u2212", "-");
+function parseNumber(text,unit=""){
+let plain=text.trim().replaceAll("\u2212","-");
 if(unit&&!UNITS[unit]&&plain.endsWith(unit))plain=plain.slice(0,-unit.length).trimEnd();
-if (plain.includes(",") && plain.includes(".")) return null;
+if(plain.includes(",")&&plain.includes("."))return null;
 const found = tokens(plain.replaceAll(",", ".").replaceAll(/(?<=\d)[\s\u202f](?=\d{3}(?!\d))/g, ""), unit);
 const value=found?.length ? calculate(found):NaN;
 return Number.isFinite(value)? Number(value.toPrecision(12)):null;
@@ -402,30 +403,30 @@ let hand=null;
 const finish=(how)=>{
 const was=hand;
 hand=null;
-document.removeEventListener("keydown", escape, true);
+document.removeEventListener("keydown",escape,true);
 if(!was?.isScrubbing)return;
 const swallow=(event)=>event.preventDefault();
-label.addEventListener("click", swallow);
-setTimeout(() => label.removeEventListener("click", swallow));
+label.addEventListener("click",swallow);
+setTimeout(()=>label.removeEventListener("click",swallow));
 how();
 };
 const escape=(event)=>{
-if (event.key !== "Escape") return;
+if(event.key !=="Escape")return;
 event.stopPropagation();
 finish(cancel);
 };
 label.classList.add("scrubs");
-label.addEventListener("pointerdown", ({ button, pointerId: id, clientX: x }) => {
+label.addEventListener("pointerdown",({button,pointerId:id,clientX:x})=>{
 if(button !==0||hand)return;
 hand={id,x,steps:0,isScrubbing:false};
 label.setPointerCapture(id);
 });
-label.addEventListener("pointermove", ({ pointerId, clientX, shiftKey }) => {
+label.addEventListener("pointermove",({pointerId,clientX,shiftKey})=>{
 if(pointerId !==hand?.id)return;
 if(!hand.isScrubbing){
 if(Math.abs(clientX - hand.x)<STILL)return;
 hand.isScrubbing=true;
-document.addEventListener("keydown", escape, true);
+document.addEventListener("keydown",escape,true);
 begin();
 }
 const steps = Math.trunc((clientX - hand.x) / PACE);
@@ -434,7 +435,7 @@ hand.x +=steps * PACE;
 hand.steps +=steps *(shiftKey ? 10:1);
 move(hand.steps);
 });
-for (const type of ["pointerup", "pointercancel"])
+for(const type of ["pointerup","pointercancel"])
 label.addEventListener(type,({pointerId})=>{
 if(pointerId===hand?.id)finish(end);
 });
@@ -478,7 +479,7 @@ const { scrubBy } = lib_scrub;
 const { span } = lib_span;
 const STOPS=8;
 const exact=(x)=>Number(x.toPrecision(5));
-const UNSET = "–";
+const UNSET="–";
 function numberEntry(field,id,{input,commit,refuse,restore}){
 const unit=unitText(field.unit);
 let latest=null;
@@ -488,7 +489,7 @@ delete box.dataset.dirty;
 };
 const take=()=>{
 clean();
-if (box.value.trim() === "") {
+if(box.value.trim()===""){
 if(field.required)return restore();
 input(undefined);
 return commit();
@@ -525,19 +526,19 @@ input(begun.latest ?? undefined);
 commit();
 },
 };
-const box = element("input", {
-type: "text",
+const box=element("input",{
+type:"text",
 id,
-class: "entry number",
-autocomplete: "off",
-spellcheck: "false",
-inputmode: field.min >= 0 ? "decimal" : undefined,
+class:"entry number",
+autocomplete:"off",
+spellcheck:"false",
+inputmode:field.min>=0 ? "decimal":undefined,
 oninput:()=>{
-box.dataset.dirty = "yes";
+box.dataset.dirty="yes";
 },
 onblur:clean,
 onkeydown:(event)=>{
-if (event.key === "Escape") {
+if(event.key==="Escape"){
 clean();
 restore();
 }
@@ -547,7 +548,7 @@ event.preventDefault();
 step(up *(event.shiftKey ? 10:1));
 },
 onkeyup:({key})=>{
-if (key === "ArrowUp" || key === "ArrowDown") commit();
+if(key==="ArrowUp"||key==="ArrowDown")commit();
 },
 onchange:take,
 });
@@ -556,13 +557,13 @@ latest=value ?? null;
 scale=span(ends,field.step,Boolean(field.ranges));
 box.placeholder=effective===undefined ?(field.absent ?? UNSET):compact(effective);
 const holds=latest ?? effective;
-if (typeof holds === "number") {
-box.setAttribute("role", "spinbutton");
-box.setAttribute("aria-valuenow", String(holds));
-} else ["role", "aria-valuenow"].forEach((name) => box.removeAttribute(name));
+if(typeof holds==="number"){
+box.setAttribute("role","spinbutton");
+box.setAttribute("aria-valuenow",String(holds));
+}else ["role","aria-valuenow"].forEach((name)=>box.removeAttribute(name));
 if(isBeingEdited(box))return;
-box.value = latest === null ? "" : compact(latest);
-box.title = latest === null || box.value === String(latest) ? "" : String(latest);
+box.value=latest===null ? "":compact(latest);
+box.title=latest===null||box.value===String(latest)? "":String(latest);
 };
 return{element:box,show,drag};
 }
@@ -573,8 +574,8 @@ const value=scale.isLog ? scale.fromShare(at):at;
 if(value<=field.open.min)return field.open.min + field.step;
 return value>=field.open.max ? field.open.max - field.step:value;
 };
-const range = element("input", {
-type: "range",
+const range=element("input",{
+type:"range",
 id,
 oninput:()=>input(inside(range.valueAsNumber)),
 onchange:commit,
@@ -591,13 +592,13 @@ const show=(value,effective,ends=field.soft)=>{
 over(ends);
 const [min,max]=[Number(range.min),Number(range.max)];
 const known=value ?? effective ?? null;
-range.classList.toggle("ghost", (value ?? null) === null);
-range.classList.toggle("unset", known === null);
+range.classList.toggle("ghost",(value ?? null)===null);
+range.classList.toggle("unset",known===null);
 range.value=String(known===null ? min:scale.isLog ? scale.toShare(known):known);
 range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
 const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
-const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
-range.setAttribute("aria-valuetext", words);
+const words=(value ?? null)!==null ? number:["not set",number].filter(Boolean).join(", ");
+range.setAttribute("aria-valuetext",words);
 };
 return{element:range,show};
 }
@@ -606,7 +607,7 @@ const range=track(field,id,events);
 const entry = numberEntry(field, `${id}-entry`, events);
 entry.element.setAttribute("aria-label", `${field.title}, number`);
 return{
-element: element("div", { class: "slider" }, range.element, entry.element),
+element:element("div",{class:"slider"},range.element,entry.element),
 drag:entry.drag,
 show(value,effective,ends){
 range.show(value,effective,ends);
@@ -615,29 +616,29 @@ entry.show(value,effective,ends);
 };
 }
 function choice(field,id,{input,commit}){
-const select = element("select", {
+const select=element("select",{
 id,
 onchange:()=>{
 input(select.value||undefined);
 commit();
 },
 });
-if (field.initial === undefined && !field.required) select.append(element("option", { value: "" }, "Automatic"));
+if(field.initial===undefined&&!field.required)select.append(element("option",{value:""},"Automatic"));
 for(const name of field.choices.filter((option)=>option !==null)){
-select.append(element("option", { value: name }, inWords(name)));
+select.append(element("option",{value:name},inWords(name)));
 }
 return{
 element:select,
 show:(value)=>{
-select.value = value ?? "";
+select.value=value ?? "";
 },
 };
 }
 function toggle(field,id,{input,commit}){
-const box = element("input", {
-type: "checkbox",
+const box=element("input",{
+type:"checkbox",
 id,
-class: "toggle",
+class:"toggle",
 onchange:()=>{
 input(box.checked);
 commit();
@@ -649,7 +650,7 @@ Object.assign(box,{checked:Boolean(value),indeterminate:(value ?? null)===null})
 return{element:box,show};
 }
 function vector(field,id,{input,commit,refuse,restore}){
-const names = field.length === 2 ? ["U", "V"] : field.isPerChannel ? ["red", "green", "blue"] : ["X", "Y", "Z"];
+const names=field.length===2 ? ["U","V"]:field.isPerChannel ? ["red","green","blue"]:["X","Y","Z"];
 let latest=null;
 const entries=names.map((axis,i)=>{
 const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
@@ -664,12 +665,12 @@ return entry;
 return{
 element:element(
 "div",
-{ class: "vector" },
+{class:"vector"},
 ...entries.map((entry,i)=>
 element(
 "span",
-{ class: "axis", "data-axis": names[i] },
-scrubBy(element("i", { "aria-hidden": "true" }, names[i].charAt(0).toUpperCase()), entry.drag),
+{class:"axis","data-axis":names[i]},
+scrubBy(element("i",{"aria-hidden":"true"},names[i].charAt(0).toUpperCase()),entry.drag),
 entry.element,
 ),
 ),
@@ -687,20 +688,20 @@ const title = `${field.title}, strength`;
 const ends={min:2 ** -STOPS,max:2 ** STOPS};
 const range = track(named(title, { soft: ends }), `${id}-strength`, events);
 const stops=numberEntry(
-named(title, { unit: "", min: undefined, max: undefined, open: {}, soft: {}, ranges: undefined, step: 0.1 }),
+named(title,{unit:"",min:undefined,max:undefined,open:{},soft:{},ranges:undefined,step:0.1}),
 `${id}-stops`,
 {...events,input:(value)=>events.input(value===undefined ? undefined:exact(2 ** value))},
 );
 const entry = numberEntry(named(title, {}), `${id}-strength-entry`, events);
-range.element.setAttribute("aria-label", title);
+range.element.setAttribute("aria-label",title);
 stops.element.setAttribute("aria-label", `${title} in stops`);
 entry.element.setAttribute("aria-label", `${title}, number`);
 return{
 element:element(
 "div",
-{ class: "slider strength" },
+{class:"slider strength"},
 range.element,
-element("span", { class: "stops" }, stops.element, element("i", { "aria-hidden": "true" }, "stops")),
+element("span",{class:"stops"},stops.element,element("i",{"aria-hidden":"true"},"stops")),
 entry.element,
 ),
 show(value){
@@ -722,8 +723,8 @@ let strength=1;
 let tint=[1,1,1];
 let isLinear=false;
 const give=()=>input(tint.map((x)=>Number((x * strength).toPrecision(5))));
-const swatch = element("input", {
-type: "color",
+const swatch=element("input",{
+type:"color",
 id,
 onchange:commit,
 oninput:()=>{
@@ -732,27 +733,27 @@ if(bright&&strength===0)strength=1;
 give();
 },
 });
-const text = element("input", {
-type: "text",
-class: "entry",
-spellcheck: "false",
-autocomplete: "off",
+const text=element("input",{
+type:"text",
+class:"entry",
+spellcheck:"false",
+autocomplete:"off",
 "aria-label": `${field.title}, #rrggbb or three linear numbers`,
 placeholder:field.absent ?? UNSET,
 oninput:()=>{
-text.dataset.dirty = "yes";
+text.dataset.dirty="yes";
 },
 onblur:()=>{
 delete text.dataset.dirty;
 },
 onkeydown:(event)=>{
-if (event.key !== "Escape") return;
+if(event.key !=="Escape")return;
 delete text.dataset.dirty;
 restore();
 },
 onchange:()=>{
 delete text.dataset.dirty;
-if (text.value === "" && !isSet) return restore();
+if(text.value===""&&!isSet)return restore();
 const known=parseColor(text.value);
 const triple=parseTriple(text.value);
 if(known)input(known.map((x)=>Number((x *(bright ? strength||1:1)).toPrecision(5))));
@@ -761,26 +762,26 @@ else return refuse("Write #rrggbb, rgb(), hsl(), 2700 K, or three linear numbers
 commit();
 },
 });
-const mode = element("button", {
-type: "button",
-class: "mode",
+const mode=element("button",{
+type:"button",
+class:"mode",
 "aria-label": `${field.title}: linear numbers`,
-"aria-pressed": "false",
+"aria-pressed":"false",
 onclick:()=>{
 isLinear=!isLinear;
-mode.setAttribute("aria-pressed", String(isLinear));
+mode.setAttribute("aria-pressed",String(isLinear));
 write();
 },
 });
 let isSet=true;
 let words=null;
 const write=()=>{
-const numbers = () => (isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint));
-const shown = isSet ? (words ?? numbers()) : "";
+const numbers=()=>(isLinear ? tint.map((x)=>compact(x * strength)).join(" "):hex(tint));
+const shown=isSet ?(words ?? numbers()):"";
 if(!isBeingEdited(text))text.value=shown;
-mode.textContent = isLinear ? "lin" : "hex";
+mode.textContent=isLinear ? "lin":"hex";
 };
-const row = element("div", { class: "color" }, swatch, text, mode);
+const row=element("div",{class:"color"},swatch,text,mode);
 const power=
 bright&&
 strengthControl(field,id,{
@@ -793,11 +794,11 @@ refuse,
 restore,
 });
 return{
-element: power ? element("div", {}, row, power.element) : row,
+element:power ? element("div",{},row,power.element):row,
 show(value){
 isSet=(value ?? null)!==null;
 words=measureWords(value);
-swatch.classList.toggle("unset", !isSet);
+swatch.classList.toggle("unset",!isSet);
 const now=linear(value ?? 0);
 const most=Math.max(...now);
 if(bright){
@@ -811,24 +812,24 @@ write();
 };
 }
 function fileEntry(id,{pick}){
-const button = element("button", { type: "button", id, onclick: () => pick() }, "Choose a file…");
+const button=element("button",{type:"button",id,onclick:()=>pick()},"Choose a file…");
 return{
 element:button,
 show(value){
-button.textContent = value ? "Another file…" : "Choose a file…";
+button.textContent=value ? "Another file…":"Choose a file…";
 },
 };
 }
 const bounded=({soft})=>Number.isFinite(soft.max - soft.min);
 function control(field,id,events){
-if (field.widget === "color") return color(field, id, events);
-if (field.widget === "strength") return strengthControl(field, id, events);
-if (field.widget === "vector") return vector(field, id, events);
-if (field.widget === "texture") return { element: element("span", { id }), show() {} };
-if (field.widget === "file") return fileEntry(id, events);
-if (field.widget === "choice") return choice(field, id, events);
-if (field.widget === "toggle") return toggle(field, id, events);
-if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
+if(field.widget==="color")return color(field,id,events);
+if(field.widget==="strength")return strengthControl(field,id,events);
+if(field.widget==="vector")return vector(field,id,events);
+if(field.widget==="texture")return{element:element("span",{id}),show(){}};
+if(field.widget==="file")return fileEntry(id,events);
+if(field.widget==="choice")return choice(field,id,events);
+if(field.widget==="toggle")return toggle(field,id,events);
+if(field.widget==="number"||!bounded(field))return numberEntry(field,id,events);
 return slider(field,id,events);
 }
 return { control };
@@ -838,7 +839,7 @@ const { hex, linear } = lib_color;
 const { element } = lib_dom;
 const { compact, inWords } = lib_format_text;
 const { isObject } = lib_patch;
-const ORDER = ["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface", "Film", "Emission", "Geometry"];
+const ORDER=["Base","Specular","Coat","Sheen","Transmission","Subsurface","Film","Emission","Geometry"];
 const MOST_WORDS=3;
 const byHand=new Map();
 const place=(group)=>(ORDER.indexOf(group)+ 1||ORDER.length + 1)- 1;
@@ -853,12 +854,12 @@ return `${short} ${typeof value === "string" ? inWords(value).toLowerCase() : co
 function folds(rows,fields){
 const groups=[...new Set(fields.map(({group})=>group))].sort((a,b)=>place(a)- place(b));
 let isMade=false;
-let query = "";
+let query="";
 const parts=groups.map((group,i)=>{
 const own=fields.filter((field)=>field.group===group);
 const elements=own.map(({name})=>rows.get(name).element);
-const told = element("span", { class: "told" });
-const body = element("div", { class: "form" }, ...elements);
+const told=element("span",{class:"told"});
+const body=element("div",{class:"form"},...elements);
 if(i===0)
 return{
 group,
@@ -866,14 +867,14 @@ own,
 told,
 node:element(
 "section",
-{ class: "fold", role: "group", "aria-label": group },
-element("h3", {}, group),
+{class:"fold",role:"group","aria-label":group},
+element("h3",{},group),
 body,
 ),
 };
-const head = element("summary", {}, element("h3", {}, group), told);
-const node = element("details", { class: "fold", "aria-label": group }, head, body);
-head.addEventListener("click", () => {
+const head=element("summary",{},element("h3",{},group),told);
+const node=element("details",{class:"fold","aria-label":group},head,body);
+head.addEventListener("click",()=>{
 if(!query)byHand.set(group,!node.open);
 });
 return{group,own,told,node};
@@ -883,28 +884,28 @@ for(const{group,own,node}of parts){
 const isFound = ({ title, hint, name }) => `${group} ${title} ${name} ${hint}`.toLowerCase().includes(query);
 const found=own.filter(isFound);
 for(const{name}of own)
-rows.get(name).element.classList.toggle("sifted", Boolean(query) && !found.some((f) => f.name === name));
-node.classList.toggle("sifted", Boolean(query) && !found.length);
-if (node.tagName !== "DETAILS") continue;
+rows.get(name).element.classList.toggle("sifted",Boolean(query)&&!found.some((f)=>f.name===name));
+node.classList.toggle("sifted",Boolean(query)&&!found.length);
+if(node.tagName !=="DETAILS")continue;
 if(query)node.open=found.length>0;
-else node.open = byHand.get(group) ?? node.classList.contains("changed");
+else node.open=byHand.get(group)?? node.classList.contains("changed");
 }
 };
 return{
-element: element("div", { class: "folds" }, ...parts.map(({ node }) => node)),
+element:element("div",{class:"folds"},...parts.map(({node})=>node)),
 show(values){
 for(const{group,own,told,node}of parts){
 const changed=own.filter(({name})=>rows.get(name).isChanged());
 const texts=changed.slice(0,MOST_WORDS).map((field)=>words(field,values[field.name],group));
-const text = [...texts, ...(changed.length > MOST_WORDS ? ["…"] : [])].join(", ");
+const text=[...texts,...(changed.length>MOST_WORDS ? ["…"]:[])].join(", ");
 if(told.textContent !==text)told.textContent=text;
-node.classList.toggle("changed", changed.length > 0);
+node.classList.toggle("changed",changed.length>0);
 }
 if(!isMade)sift();
 isMade=true;
 },
 reveal(name){
-const node = rows.get(name)?.element.closest("details.fold");
+const node=rows.get(name)?.element.closest("details.fold");
 if(node)node.open=true;
 },
 filter(text){
@@ -917,14 +918,14 @@ return { folds };
 })();
 const lib_files = (() => {
 function acceptFiles(node,take){
-node.addEventListener("dragover", (event) => {
-if (!event.dataTransfer.types.includes("Files")) return;
+node.addEventListener("dragover",(event)=>{
+if(!event.dataTransfer.types.includes("Files"))return;
 event.preventDefault();
 event.stopPropagation();
 node.classList.add("over");
 });
-node.addEventListener("dragleave", () => node.classList.remove("over"));
-node.addEventListener("drop", (event) => {
+node.addEventListener("dragleave",()=>node.classList.remove("over"));
+node.addEventListener("drop",(event)=>{
 node.classList.remove("over");
 const [file]=event.dataTransfer.files;
 if(!file)return;
@@ -937,8 +938,8 @@ return { acceptFiles };
 const lib_tooltip = (() => {
 const { element } = lib_dom;
 const PATIENCE_MS=350;
-const WRITTEN = ["text", "button"];
-const bubble = element("div", { class: "tooltip", "aria-hidden": "true", hidden: true });
+const WRITTEN=["text","button"];
+const bubble=element("div",{class:"tooltip","aria-hidden":"true",hidden:true});
 let timer=0;
 function open(row,text){
 bubble.textContent=text;
@@ -957,18 +958,18 @@ clearTimeout(timer);
 bubble.hidden=true;
 }
 function describe(row,handle,text){
-handle.addEventListener("pointerenter", () => {
+handle.addEventListener("pointerenter",()=>{
 clearTimeout(timer);
 timer=setTimeout(open,PATIENCE_MS,row,text);
 });
-handle.addEventListener("pointerleave", closeTooltip);
-row.addEventListener("focusin", ({ target }) => {
-if (!WRITTEN.includes(target.type) && target.matches(":focus-visible")) open(row, text);
+handle.addEventListener("pointerleave",closeTooltip);
+row.addEventListener("focusin",({target})=>{
+if(!WRITTEN.includes(target.type)&&target.matches(":focus-visible"))open(row,text);
 });
-row.addEventListener("focusout", closeTooltip);
-row.addEventListener("pointerdown", closeTooltip);
-row.addEventListener("keydown", (event) => {
-if (event.key === "Escape") closeTooltip();
+row.addEventListener("focusout",closeTooltip);
+row.addEventListener("pointerdown",closeTooltip);
+row.addEventListener("keydown",(event)=>{
+if(event.key==="Escape")closeTooltip();
 });
 }
 return { describe };
@@ -986,17 +987,17 @@ const { endsOf } = lib_span;
 const { describe } = lib_tooltip;
 const { unitText } = lib_format_text;
 const isSame=({widget},a,b)=>
-widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+widget==="color"&&a !==undefined&&b !==undefined ? equal(linear(a),linear(b)):equal(a,b);
 const isTexture=(value)=>isObject(value)&&value.texture !==undefined;
 function row(field,{change,commit,forgive,takeFile,pickFile,slot,beneath}){
 const id=freshId(field.name);
 const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
 const mark=(text)=>{
 trouble.hidden=!text;
-trouble.textContent = text ?? "";
-for (const input of node.querySelectorAll("input, select")) {
+trouble.textContent=text ?? "";
+for(const input of node.querySelectorAll("input, select")){
 if(under?.element.contains(input))continue;
-if (text) input.setAttribute("aria-invalid", "true");
+if(text)input.setAttribute("aria-invalid","true");
 else input.removeAttribute("aria-invalid");
 }
 };
@@ -1016,9 +1017,9 @@ widget.show(latest);
 forgive();
 },
 });
-const reset = element("button", {
-type: "button",
-class: "reset",
+const reset=element("button",{
+type:"button",
+class:"reset",
 "aria-label": `Reset ${field.title}`,
 onclick:()=>{
 mark(null);
@@ -1026,10 +1027,10 @@ change(field.name,undefined);
 commit();
 },
 });
-const label = element("label", { for: id }, field.title);
+const label=element("label",{for:id},field.title);
 if(field.unit){
 const unit=unitText(field.unit);
-label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
+label.append(unit.length<3 ? "\u00a0":" ",element("span",{class:"unit"},unit));
 }
 if(widget.drag)scrubBy(label,widget.drag);
 const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
@@ -1043,9 +1044,9 @@ const under=image&&beneath?.(field);
 const parts=[label,widget.element,image?.chip,image?.button,reset,under?.element,hint,trouble].filter(
 Boolean,
 );
-const node = element("div", { class: image ? "field pictured" : "field", "data-field": field.name }, ...parts);
+const node=element("div",{class:image ? "field pictured":"field","data-field":field.name},...parts);
 if(image&&takeFile)acceptFiles(node,(file)=>takeFile(field.name,file));
-for (const input of node.querySelectorAll("input, select")) {
+for(const input of node.querySelectorAll("input, select")){
 input.setAttribute("aria-describedby", `${hint ? hint.id : ""} ${trouble.id}`.trim());
 }
 if(hint)describe(node,label,field.hint);
@@ -1057,7 +1058,7 @@ show(value,initial=field.initial,effective=undefined,ends=undefined){
 latest=value ?? initial;
 const textured=isTexture(latest);
 if(image){
-widget.element.hidden = textured || field.widget === "texture";
+widget.element.hidden=textured||field.widget==="texture";
 image.show(latest);
 under?.show(latest);
 }
@@ -1071,7 +1072,7 @@ function schemaForm(fields,acts){
 const rows=new Map(fields.map((field)=>[field.name,row(field,acts)]));
 const parts=fields.some(({group})=>group)? folds(rows,fields):null;
 return{
-element: parts?.element ?? element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
+element:parts?.element ?? element("div",{class:"form"},...[...rows.values()].map((each)=>each.element)),
 filter:(text)=>parts?.filter(text),
 show(values,initials={}){
 for(const [name,each] of rows){
@@ -1103,9 +1104,9 @@ const { element, freshId } = lib_dom;
 const { isObject, pointer, put } = lib_patch;
 const { schemaForm } = forms_schema_form;
 const { fields, materialModels } = server_schema;
-const option = (value, title = value) => element("option", { value }, title);
+const option=(value,title=value)=>element("option",{value},title);
 function slot(){
-const chip = element("span", { class: "chip" });
+const chip=element("span",{class:"chip"});
 return{
 chip,
 show(value){
@@ -1114,15 +1115,15 @@ if(!chip.hidden)chip.textContent=value.texture;
 },
 };
 }
-const isSlid = ({ widget }) => !["texture", "file"].includes(widget);
+const isSlid=({widget})=>!["texture","file"].includes(widget);
 function menu(title,entries,act){
 const select=element(
 "select",
 {
-"aria-label": title,
+"aria-label":title,
 onchange:()=>{
 const{value}=select;
-select.value = "";
+select.value="";
 if(value)act(value);
 },
 },
@@ -1133,12 +1134,12 @@ return select;
 }
 function panel({schema,presets,current,change,take,choose,home}){
 const models=materialModels(schema);
-const id = freshId("material");
-const materials = element("select", { id, onchange: () => choose(materials.value) });
-const place = element("div", { class: "parameters" });
-let name = "";
+const id=freshId("material");
+const materials=element("select",{id,onchange:()=>choose(materials.value)});
+const place=element("div",{class:"parameters"});
+let name="";
 let form=null;
-const give = (field, value) => change(put(current(), pointer("materials", name, field), value));
+const give=(field,value)=>change(put(current(),pointer("materials",name,field),value));
 const made=(type)=>{
 const made=schemaForm(fields(schema,models[type]).filter(isSlid),{
 change:give,
@@ -1151,28 +1152,28 @@ return{type,...made};
 };
 const inside=element(
 "div",
-{ class: "inside" },
+{class:"inside"},
 element(
 "div",
-{ class: "menus" },
-menu("Scene", presets.scenes, (value) => take("scenes", value)),
-menu("Environment", presets.environments, (value) => take("environments", value)),
-element("button", { type: "button", onclick: home }, "Reset view"),
+{class:"menus"},
+menu("Scene",presets.scenes,(value)=>take("scenes",value)),
+menu("Environment",presets.environments,(value)=>take("environments",value)),
+element("button",{type:"button",onclick:home},"Reset view"),
 ),
 element(
 "div",
-{ class: "menus material" },
-element("label", { for: id }, "Material"),
+{class:"menus material"},
+element("label",{for:id},"Material"),
 materials,
-menu("Library", presets.materials, (value) => take("materials", value)),
+menu("Library",presets.materials,(value)=>take("materials",value)),
 ),
 place,
 );
 return{
-element: element("div", { class: "panel" }, inside),
+element:element("div",{class:"panel"},inside),
 show(scene,chosen){
 const names=Object.keys(scene.materials);
-if (names.join("\n") !== [...materials.options].map(({ value }) => value).join("\n"))
+if(names.join("\n")!==[...materials.options].map(({value})=>value).join("\n"))
 materials.replaceChildren(...names.map((each)=>option(each)));
 materials.value=chosen;
 name=chosen;
@@ -1236,7 +1237,7 @@ return distance * (type === "panorama" ? Math.PI / 2 : Math.tan(radians(vfov) / 
 function turned(camera,type){
 const{position,target,up}=camera;
 const height=Number((2 * halfHeight(camera,axes(camera).distance)).toPrecision(3));
-return { type, position, target, up, ...(type === "orthographic" ? { height } : {}) };
+return{type,position,target,up,...(type==="orthographic" ?{height}:{})};
 }
 function pan(camera,right,down){
 const{position,target}=camera;
@@ -1246,13 +1247,13 @@ const shift=add(scale(frame.right,-right * height),scale(frame.up,down * height)
 return{position:tidy(add(position,shift)),target:tidy(add(target,shift))};
 }
 const zoom=({type,position,target,height},factor)=>
-type === "orthographic"
+type==="orthographic"
 ?{height:Number((height * factor).toPrecision(6))}
 :{position:tidy(add(target,scale(subtract(position,target),factor)))};
 function frame(camera,{center,radius},aspect,share=0.8){
 const{type,position,target}=camera;
 const narrow=Math.min(1,aspect);
-if (type === "orthographic") {
+if(type==="orthographic"){
 const back=scale(normalize(subtract(position,target)),Math.max(axes(camera).distance,2 * radius));
 const height = Number(((2 * radius) / (share * narrow)).toPrecision(4));
 return{position:tidy(add(center,back)),target:tidy(center),height};
@@ -1280,24 +1281,24 @@ function watchGestures(stage,move,tool){
 const fingers=new Map();
 let last=null;
 let began=null;
-let kind = "orbit";
+let kind="orbit";
 let turning=0;
-stage.addEventListener("contextmenu", (event) => event.preventDefault());
+stage.addEventListener("contextmenu",(event)=>event.preventDefault());
 const meaning=(event)=>{
-if (tool() === "inspect") return "slide";
-if (event.button !== 0 || event.shiftKey) return "pan";
-if (event.altKey) return "turn";
-return tool() === "fly" ? "look" : "orbit";
+if(tool()==="inspect")return "slide";
+if(event.button !==0||event.shiftKey)return "pan";
+if(event.altKey)return "turn";
+return tool()==="fly" ? "look":"orbit";
 };
 const drag=(right,down)=>{
 const [w,h]=[stage.clientWidth,stage.clientHeight];
-if (kind === "slide") move.slide(right, down);
+if(kind==="slide")move.slide(right,down);
 else if (fingers.size > 1 || kind === "pan") move.pan(right / h, down / h);
 else if (kind === "turn") move.turn(right / w);
 else if (kind === "look") move.look((right / w) * LOOK_PER_WIDTH, (down / w) * LOOK_PER_WIDTH);
 else move.orbit((right / w) * ORBIT_PER_WIDTH, (down / w) * ORBIT_PER_WIDTH);
 };
-stage.addEventListener("pointerdown", (event) => {
+stage.addEventListener("pointerdown",(event)=>{
 stage.setPointerCapture(event.pointerId);
 if(event.button===1)event.preventDefault();
 fingers.set(event.pointerId,{x:event.clientX,y:event.clientY});
@@ -1307,7 +1308,7 @@ kind=meaning(event);
 began=event.button===0 ? last:null;
 }else began=null;
 });
-stage.addEventListener("pointermove", (event) => {
+stage.addEventListener("pointermove",(event)=>{
 move.hover(event.clientX,event.clientY);
 if(!fingers.has(event.pointerId))return;
 fingers.set(event.pointerId,{x:event.clientX,y:event.clientY});
@@ -1324,12 +1325,12 @@ if(!fingers.delete(event.pointerId))return;
 last=fingers.size ? middle([...fingers.values()]):null;
 if(fingers.size)return;
 stage.classList.remove("held");
-if (began && event.type === "pointerup") move.tap(event.clientX, event.clientY, event.altKey);
+if(began&&event.type==="pointerup")move.tap(event.clientX,event.clientY,event.altKey);
 else move.rest();
 began=null;
 };
-stage.addEventListener("pointerup", lift);
-stage.addEventListener("pointercancel", lift);
+stage.addEventListener("pointerup",lift);
+stage.addEventListener("pointercancel",lift);
 stage.addEventListener(
 "wheel",
 (event)=>{
@@ -1353,12 +1354,12 @@ const KEY_ZOOM=1.1;
 const STEPS={ArrowLeft:[-1,0],ArrowRight:[1,0],ArrowUp:[0,-1],ArrowDown:[0,1]};
 const ZOOMS = { "+": 1 / KEY_ZOOM, "=": 1 / KEY_ZOOM, "-": KEY_ZOOM };
 function picture({camera,move}){
-const canvas = element("canvas", {
-tabindex: "0",
-role: "img",
-"aria-label": "Picture. Drag to orbit, with Shift to pan; arrow keys orbit, plus and minus zoom.",
+const canvas=element("canvas",{
+tabindex:"0",
+role:"img",
+"aria-label":"Picture. Drag to orbit, with Shift to pan; arrow keys orbit, plus and minus zoom.",
 });
-const stage = element("div", { class: "stage" }, canvas);
+const stage=element("div",{class:"stage"},canvas);
 const by=(change,...amounts)=>move(change(camera(),...amounts));
 watchGestures(
 canvas,
@@ -1373,9 +1374,9 @@ hover(){},
 tap(){},
 rest(){},
 },
-() => "orbit",
+()=>"orbit",
 );
-canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
+canvas.addEventListener("pointerdown",()=>canvas.focus({preventScroll:true}));
 stage.addEventListener(
 "wheel",
 (event)=>{
@@ -1383,7 +1384,7 @@ if(document.activeElement !==canvas&&!event.ctrlKey)event.stopPropagation();
 },
 {capture:true},
 );
-canvas.addEventListener("keydown", (event) => {
+canvas.addEventListener("keydown",(event)=>{
 if(event.ctrlKey||event.metaKey||event.altKey)return;
 const step=STEPS[event.key];
 if (step && event.shiftKey) by(pan, step[0] / 20, step[1] / 20);
@@ -1402,7 +1403,7 @@ const isOlder=frame.generation<shown.generation;
 if(!isOlder){
 shown=frame;
 Object.assign(canvas,{width:image.width,height:image.height});
-canvas.getContext("2d").drawImage(image, 0, 0);
+canvas.getContext("2d").drawImage(image,0,0);
 canvas.style.setProperty("aspect-ratio", `${image.width} / ${image.height}`);
 }
 image.close();
@@ -1419,12 +1420,12 @@ const { defaults, property } = server_schema;
 const { panel } = widget_panel;
 const { picture } = widget_picture;
 const PATIENCE_MS=2000;
-const BUSY = "The kernel is busy. The picture follows when it is free.";
+const BUSY="The kernel is busy. The picture follows when it is free.";
 function view({model,el}){
 beginIds(crypto.getRandomValues(new Uint16Array(1))[0] * 1000);
 const me=crypto.randomUUID();
-const status = element("output", { class: "status", role: "status" });
-const samples = element("span", { class: "samples" });
+const status=element("output",{class:"status",role:"status"});
+const samples=element("span",{class:"samples"});
 let scene=null;
 let sent=null;
 let home=null;
@@ -1443,19 +1444,19 @@ if(patch===undefined)return;
 sent=scene;
 number +=1;
 waits=setTimeout(say,PATIENCE_MS,BUSY);
-send("edit", { number, patch });
+send("edit",{number,patch});
 };
 const change=(next)=>{
 scene=next;
 show();
 flush();
 };
-const camera = () => ({ ...defaults(schema, property(schema, schema, "camera")), ...scene.camera });
+const camera=()=>({...defaults(schema,property(schema,schema,"camera")),...scene.camera});
 const move=(changes)=>{
 if(scene)change({...scene,camera:{...scene.camera,...changes}});
 };
 const canvas=picture({camera,move});
-const show = () => side?.show(scene, model.get("material"));
+const show=()=>side?.show(scene,model.get("material"));
 const heard={
 begin({schema:described,presets,scene:first}){
 schema=described;
@@ -1464,9 +1465,9 @@ schema,
 presets,
 current:()=>scene,
 change,
-take: (kind, name) => send("preset", { kind, name }),
+take:(kind,name)=>send("preset",{kind,name}),
 choose(name){
-model.set("material", name);
+model.set("material",name);
 model.save_changes();
 },
 home:()=>move({...home}),
@@ -1486,7 +1487,7 @@ taken({number:taken}){
 if(taken !==number)return;
 clearTimeout(waits);
 waits=0;
-if (status.textContent === BUSY) say("");
+if(status.textContent===BUSY)say("");
 flush();
 },
 refused({pointer,detail,scene:last}){
@@ -1497,7 +1498,7 @@ async frame(frame,[bytes]){
 try{
 await canvas.paint(frame,bytes);
 }finally{
-send("ack", { seq: frame.seq });
+send("ack",{seq:frame.seq});
 }
 const noise = frame.noise === null ? "" : `, ${percent(frame.noise)} noise`;
 samples.textContent = `${amount(frame.samples, "sample")}${noise}`;
@@ -1509,23 +1510,23 @@ if(!message.view||message.view===me)heard[message.type]?.(message,buffers);
 const root=element(
 "div",
 {
-class: "sunbox-view",
-onfocusin: ({ target }) => target.setAttribute("data-lm-suppress-shortcuts", "true"),
+class:"sunbox-view",
+onfocusin:({target})=>target.setAttribute("data-lm-suppress-shortcuts","true"),
 onkeydown:({key,target})=>{
-if (key === "Enter" && target.type === "text") target.dispatchEvent(new Event("change"));
+if(key==="Enter"&&target.type==="text")target.dispatchEvent(new Event("change"));
 },
 },
-element("div", { class: "shown" }, canvas.element, element("div", { class: "line" }, samples, status)),
+element("div",{class:"shown"},canvas.element,element("div",{class:"line"},samples,status)),
 );
 el.append(root);
-model.on("msg:custom", hear);
-model.on("change:material", show);
+model.on("msg:custom",hear);
+model.on("change:material",show);
 let isSeen=true;
 const look=(isIn)=>{
-const seen = isIn && document.visibilityState === "visible";
+const seen=isIn&&document.visibilityState==="visible";
 if(seen===isSeen)return;
 isSeen=seen;
-send(seen ? "seen" : "unseen");
+send(seen ? "seen":"unseen");
 };
 let isIn=true;
 const observer=new IntersectionObserver((entries)=>{
@@ -1534,13 +1535,13 @@ look(isIn);
 });
 const turned=()=>look(isIn);
 observer.observe(canvas.element);
-document.addEventListener("visibilitychange", turned);
+document.addEventListener("visibilitychange",turned);
 send("hello");
 return()=>{
 observer.disconnect();
-document.removeEventListener("visibilitychange", turned);
-model.off("msg:custom", hear);
-model.off("change:material", show);
+document.removeEventListener("visibilitychange",turned);
+model.off("msg:custom",hear);
+model.off("change:material",show);
 clearTimeout(waits);
 send("unseen");
 };
