@@ -2,9 +2,7 @@
 
 import { AxisViews } from "./axis-views.js";
 import { Handles } from "./handles.js";
-import { placeHighlight } from "./highlight-tool.js";
 import { Inspector } from "./inspector.js";
-import { irradianceFor } from "./light-there.js";
 import { Markers } from "./markers.js";
 import { Picks } from "./picks.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
@@ -85,12 +83,14 @@ export class Tools {
     );
   }
 
-  placeHighlight(place, aspect) {
+  async placeHighlight(place, aspect) {
+    const { placeHighlight } = await import("./highlight-tool.js");
     return placeHighlight(this, place, aspect);
   }
 
   // As in light-there.js.
-  irradianceFor(shapes, toLight, exposure) {
+  async irradianceFor(shapes, toLight, exposure) {
+    const { irradianceFor } = await import("./light-there.js");
     return irradianceFor(this.stream, shapes, toLight, exposure);
   }
 }
