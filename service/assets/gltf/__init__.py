@@ -24,5 +24,6 @@ textures              textures and samplers -> the document's
 ktx2_images           images of KHR_texture_basisu as PNG files
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
+iridescence           KHR_materials_iridescence as a thin film
 lights_and_camera     lights and cameras -> the document's
 """

@@ -13,7 +13,7 @@ from service.problems import escaped
 READ = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission", "KHR_materials_dispersion", "KHR_materials_emissive_strength",
-    "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_ior", "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_meshopt_compression",
     "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform", "EXT_mesh_gpu_instancing",

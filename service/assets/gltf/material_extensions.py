@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from service.assets.gltf import anisotropy_texture
+from service.assets.gltf import anisotropy_texture, iridescence
 from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.textures import factor
 from service.scene.numbers import LARGEST
@@ -32,6 +32,7 @@ def add(read: MaterialReader, document: dict[str, Any]) -> None:
         document["transmission"] = read.scalar(transmission, "transmissionTexture", through, "r")
         _volume(read, document)
     _diffuse_transmission(read, document)
+    iridescence.add(read, document)
 
 
 def normal_map(read: MaterialReader, owner: JsonView, name: str, parameter: str) -> dict[str, Any]:

@@ -14,14 +14,15 @@ from service.scene.material.principled import index_of_specular, roughness_of_gl
 from service.scene.texture import ColorTexture, ScalarTexture
 
 WHITE = (1.0, 1.0, 1.0)
+FILM_WEIGHT = "thin_film_weight"  # of models whose films cover a part, which glTF has as well
 LUMINANCE = (0.3, 0.6, 0.1)  # of the hue that tints, as the model has it
-SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1
+SHOWN_ABBE, LEAST_ABBE = 20.0, 1e-9  # the Abbe number of a dispersion of 1; the least that is read
 SPECULAR, SPECULAR_IOR = 0.5, 1.5  # principled's own reflectance head-on, and its index
 WRITTEN = {
     "specular", "specular_color", "specular_tint", "ior", "transmission", "abbe", "attenuation_color",
     "attenuation_distance", "sheen", "sheen_color", "sheen_tint", "sheen_roughness", "clearcoat", "clearcoat_gloss",
     "clearcoat_roughness", "clearcoat_normal_map", "anisotropic", "anisotropic_rotation", "thin_walled",
-    "diffuse_transmission", "diffuse_transmission_color",
+    "diffuse_transmission", "diffuse_transmission_color", "film_thickness", "film_ior",
 }  # fmt: skip
 
 
@@ -30,7 +31,7 @@ def written(of: MaterialWriter) -> Tree:
     found: Tree = {}
     if of.material.metallic != 1:  # a metal shows nothing of these
         found |= _specular(of) | _transmission(of) | _diffuse_transmission(of) | _sheen(of)
-    return found | _clearcoat(of) | _anisotropy(of)
+    return found | _clearcoat(of) | _anisotropy(of) | _iridescence(of)
 
 
 def _specular(of: MaterialWriter) -> Tree:
@@ -84,7 +85,7 @@ def _transmission(of: MaterialWriter) -> Tree:
         if shade != WHITE:
             volume["attenuationColor"] = [min(each, 1.0) for each in shade]
     if m.abbe is not None:
-        found |= of.builder.extension("KHR_materials_dispersion", {"dispersion": SHOWN_ABBE / m.abbe})
+        found |= of.builder.extension("KHR_materials_dispersion", {"dispersion": SHOWN_ABBE / max(m.abbe, LEAST_ABBE)})
     return found | of.builder.extension("KHR_materials_volume", volume)
 
 
@@ -184,6 +185,28 @@ def _anisotropy(of: MaterialWriter) -> Tree:
         east = (Plane(value=1.0), Plane(value=0.5), plane, None)
         found["anisotropyTexture"] = of.textures.info(east, is_srgb=False)
     return of.builder.extension("KHR_materials_anisotropy", found)
+
+
+def _iridescence(of: MaterialWriter) -> Tree:
+    """The film's thickness is mix(minimum, maximum, texture) in glTF; ours is its maximum times the texture."""
+    m, found = of.material, Tree()
+    thickness = m.film_thickness
+    if isinstance(thickness, ScalarTexture):
+        if thickness.factor > 0:
+            plane = of.textures.plane(thickness, 1, of.at("film_thickness"))
+            if (info := of.textures.info((None, plane, None, None), is_srgb=False)) is not None:
+                found = {"iridescenceThicknessMinimum": 0.0, "iridescenceThicknessTexture": info}
+        thickness = thickness.factor
+    if thickness == 0:
+        return {}
+    ior = m.film_ior
+    if isinstance(ior, ScalarTexture):
+        of.tell("film_ior", "a texture of indices has no place in glTF; its factor is written")
+        ior = min(max(ior.factor, 1.0), 4.0)
+    factor, plane = of.scalar(getattr(of.given, FILM_WEIGHT, 1.0), FILM_WEIGHT, 0)
+    found |= _scalar(of, "iridescence", factor, plane, 0)
+    found |= {"iridescenceIor": ior, "iridescenceThicknessMaximum": thickness}
+    return of.builder.extension("KHR_materials_iridescence", found)
 
 
 def _scalar(of: MaterialWriter, name: str, factor: float, plane: Plane | None, channel: int) -> Tree:

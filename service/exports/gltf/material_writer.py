@@ -32,7 +32,8 @@ class MaterialWriter:
         self.material, self.asked, self.textures = material, asked, textures
         self.builder, self.losses = textures.builder, textures.losses
         self._pointer = f"/materials/{escaped(name)}"
-        self._given = type(textures.scene.materials[name]).model_fields.keys()
+        self.given = textures.scene.materials[name]
+        self._given = type(self.given).model_fields.keys()
 
     def tell(self, field: str, detail: str) -> None:
         """Tell of a loss at a field that the document has; a converted material may have got others."""

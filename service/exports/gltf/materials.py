@@ -57,7 +57,8 @@ class Materials:
 
     def _as_principled(self, name: str) -> PrincipledMaterial:
         if name not in self._plain:
-            self._plain[name] = as_principled(self.scene.materials[name], f"/materials/{escaped(name)}", self.losses)
+            material, pointer = self.scene.materials[name], f"/materials/{escaped(name)}"
+            self._plain[name] = as_principled(material, pointer, self.losses, kept={extensions.FILM_WEIGHT})
         return self._plain[name]
 
     def _unlit(self, material: DiffuseMaterial, name: str, asked: Asked) -> Tree:

@@ -269,11 +269,11 @@ def test_without_lights_there_is_the_default_environment(store: AssetStore) -> N
 
 
 def test_what_is_not_had_is_listed_with_its_place(store: AssetStore) -> None:
-    file = Gltf().of({"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1}, "EXT_a/b": {}}})
+    file = Gltf().of({"extensions": {"KHR_materials_subsurface": {}, "EXT_a/b": {}}})
     file.add("animations", {"channels": [], "samplers": []})
-    file.tree["extensionsUsed"] = ["KHR_materials_iridescence"]
+    file.tree["extensionsUsed"] = ["KHR_materials_subsurface"]
     places = noted(imported(store, file))
-    assert {"/materials/0/extensions/KHR_materials_iridescence", "/materials/0/extensions/EXT_a~1b"} <= set(places)
+    assert {"/materials/0/extensions/KHR_materials_subsurface", "/materials/0/extensions/EXT_a~1b"} <= set(places)
     assert "/animations/0/samplers" in places, "one that moves nothing"
 
 

@@ -24,7 +24,7 @@ def red_square() -> Gltf:
     file = Gltf().of(
         {
             "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]},
-            "extensions": {"KHR_materials_unlit": {}, "KHR_materials_iridescence": {}},
+            "extensions": {"KHR_materials_unlit": {}, "KHR_materials_subsurface": {}},
         }
     )
     file.node(mesh=0, translation=[0, 0, -5])
@@ -50,7 +50,7 @@ def test_over_rest(server: Server) -> None:
     info = answer.json()
     assert (info["kind"], info["triangles"]) == ("scene", 4)
     assert info["bounds"] == [[-1, -1, -5], [1, 1, 0]], "of both nodes, where they stand"
-    assert info["warnings"][0]["pointer"] == "/materials/0/extensions/KHR_materials_iridescence"
+    assert info["warnings"][0]["pointer"] == "/materials/0/extensions/KHR_materials_subsurface"
     scene = http.get(f"/v1/assets/{info['id']}/scene")
     document = scene.json()
     assert scene.status_code == 200 and json.loads(scene.headers["sunbox-warnings"]) == info["warnings"]
@@ -77,7 +77,7 @@ def test_render(gpu: Any, tmp_path: Path, data_dir: Path, capsys: pytest.Capture
     model, first, again = tmp_path / "m.glb", tmp_path / "a.png", tmp_path / "b.png"
     model.write_bytes(red_square().glb())
     assert main(["render", str(model), "-o", str(first), *SMALL]) == 0
-    assert "/materials/0/extensions/KHR_materials_iridescence" in capsys.readouterr().err
+    assert "/materials/0/extensions/KHR_materials_subsurface" in capsys.readouterr().err
     assert is_red(first)
     model.unlink()
     assert main(["render", str(first), "-o", str(again)]) == 0
