@@ -63,6 +63,8 @@ def document(entry: dict[str, Any]) -> dict[str, Any]:
         "base_color": [min(1.0, channel) for channel in entry["color"]],
         "roughness": entry["roughness"],
     }
+    if "thinFilmThickness" in entry:
+        out |= {"film_thickness": _typical(entry["thinFilmThickness"]), "film_ior": entry["thinFilmIor"]}
     if entry["metalness"]:
         return out | {"metallic": entry["metalness"]} | _complex_index(entry, out["base_color"])
     if "ior" in entry:
@@ -72,7 +74,14 @@ def document(entry: dict[str, Any]) -> dict[str, Any]:
     if entry.get("transmission"):
         out["transmission"] = entry["transmission"]
         out |= _absorption(entry.get("volumeCoefficients", {}).get("absorption", [0.0]))
+        if "transmissionDispersion" in entry:
+            out["abbe"] = entry["transmissionDispersion"]
     return out
+
+
+def _typical(values: list[float]) -> float:
+    """Of a range and what is most common the latter; the middle of a range; the only value."""
+    return values[2] if len(values) == 3 else sum(values) / len(values)
 
 
 def _complex_index(entry: dict[str, Any], color: list[float]) -> dict[str, Any]:

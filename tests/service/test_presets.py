@@ -101,6 +101,13 @@ def test_the_database_s_numbers_are_the_presets_numbers() -> None:
     rates = -np.log(wine["attenuation_color"]) / wine["attenuation_distance"]
     assert rates / 100 == pytest.approx([1.1632, 2.5191, 2.9434], rel=1e-3)
     assert presets.get("materials", "physically-based-brick")["base_color"] == [0.262, 0.095, 0.061]
+    assert presets.get("materials", "physically-based-diamond")["abbe"] == 55.3
+    bubble = presets.get("materials", "physically-based-soap-bubble")
+    assert (bubble["film_thickness"], bubble["film_ior"], bubble["ior"]) == (500, 1.4, 1)
+    titanium = presets.get("materials", "physically-based-titanium-anodized")
+    assert (titanium["film_thickness"], titanium["film_ior"]) == (160, 2.488), "the middle of 20 to 300 nm"
+    everything = [physically_based.document(entry) for entry in physically_based.database()["materials"]]
+    assert (sum("abbe" in m for m in everything), sum("film_ior" in m for m in everything)) == (22, 3)
 
 
 def test_the_database_s_metals_have_their_index_and_their_colour() -> None:
