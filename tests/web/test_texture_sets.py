@@ -69,10 +69,10 @@ def test_materialx_makes_the_material_with_the_images_that_come_with_it(editor: 
     editor.drop("#stage", {"moss.mtlx": made, "moss.png": png(GREEN)})
     editor.wait("what went where", lambda: "2 files is the material Moss." in editor.text("#messages"))
     editor.wait("a green ball", lambda: is_green(editor))
-    plain = mtlx(surface("gltf_pbr", value("base_color", [0.5, 0.5, 0.5]), value("iridescence", 1), name="Grey"))
+    plain = mtlx(surface("gltf_pbr", value("base_color", [0.5, 0.5, 0.5]), value("occlusion", 0.5), name="Grey"))
     editor.drop("#stage", {"grey.mtlx": plain})
     editor.wait("the other", lambda: "grey.mtlx is the material Grey." in editor.text("#messages"))
-    assert "SGrey/iridescence" in editor.text("#messages"), "what is lost is listed"
+    assert "SGrey/occlusion" in editor.text("#messages"), "what is lost is listed"
 
 
 def test_two_sets_in_a_zip_are_two_materials(editor: Editor) -> None:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 from service.assets.materialx import openpbr
-from service.assets.materialx.surface import FILM, NITS, TANGENT, Surface
+from service.assets.materialx.surface import NITS, TANGENT, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -26,6 +26,7 @@ from service.assets.materialx.trees import (
 )
 
 SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1 of gltf_pbr
+HALF = 0.5  # a film that covers so much is nearer to a whole one than to none
 COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
 COAT_TINT = "the colour of the coat tints what is under it, at all angles alike"
 DARKER = "the coat does not darken what is under it"
@@ -50,6 +51,7 @@ def standard_surface(s: Surface) -> None:
     s.put("transmission", "transmission", transmission, 0.0)
     _sheen(s, s.tree("sheen"), s.tree("sheen_color"), s.tree("sheen_roughness"), "sheen")
     _coat(s, "coat", "coat_roughness", "coat_IOR", "coat_normal")
+    _film(s, "thin_film_thickness", "thin_film_IOR")
     if s.is_used("transmission_dispersion", 0):
         s.abbe(s.number("transmission_dispersion", 0))
     _emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission")
@@ -62,7 +64,6 @@ def standard_surface(s: Surface) -> None:
         ("coat_anisotropy", 0, "an anisotropic coat is not supported"),
         ("coat_affect_color", 0, DARKER),
         ("coat_affect_roughness", 0, "the coat does not roughen what is under it"),
-        ("thin_film_thickness", 0, FILM),
     ])  # fmt: skip
     _metal_edges(s, metalness, "specular_color")
     _tangent(s)
@@ -93,6 +94,7 @@ def open_pbr_surface(s: Surface) -> None:
     s.put("transmission", "transmission_weight", s.tree("transmission_weight"), 0.0)
     _sheen(s, s.tree("fuzz_weight"), s.tree("fuzz_color"), s.tree("fuzz_roughness"), "fuzz_weight")
     _coat(s, "coat_weight", "coat_roughness", "coat_ior", "geometry_coat_normal")
+    _film(s, "thin_film_thickness", "thin_film_ior", "thin_film_weight", 1e3)
     if s.is_used("transmission_dispersion_scale", 0):
         share = s.number("transmission_dispersion_scale", 0)
         s.abbe(s.number("transmission_dispersion_abbe_number", 20) / share if share > 0 else 0)
@@ -104,7 +106,6 @@ def open_pbr_surface(s: Surface) -> None:
         ("base_diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
         ("coat_roughness_anisotropy", 0, "an anisotropic coat is not supported"),
-        ("thin_film_weight", 0, FILM),
     ])  # fmt: skip
     if s.is_used("coat_weight", 0) and s.is_used("coat_darkening", 0):
         s.note("coat_darkening", DARKER)
@@ -139,6 +140,7 @@ def gltf_pbr(s: Surface) -> None:
     if not s.is_black(color):
         _sheen(s, constant(1.0), color, s.tree("sheen_roughness"), "sheen_color")
     _coat(s, "clearcoat", "clearcoat_roughness", None, "clearcoat_normal")
+    _film(s, "iridescence_thickness", "iridescence_ior", "iridescence")
     _emission(s, times(s.tree("emissive"), s.tree("emissive_strength")), "emissive")
     mode = int(s.number("alpha_mode", 0))
     if mode:
@@ -150,7 +152,6 @@ def gltf_pbr(s: Surface) -> None:
         s.abbe(SHOWN_ABBE / share)
     s.lose([
         ("occlusion", 1, "ambient occlusion is left out: the light that reaches a corner is traced"),
-        ("iridescence", 0, FILM),
     ])  # fmt: skip
     _tangent(s)
 
@@ -289,6 +290,33 @@ def _coat(s: Surface, weight: str, roughness: str, ior: str | None, normal: str 
     s.put("clearcoat_roughness", roughness, s.tree(roughness))
     if normal is not None:
         s.normal("clearcoat_normal_map", normal)
+
+
+def _film(s: Surface, thickness: str, ior: str, weight: str | None = None, nanometres: float = 1.0) -> None:
+    """A thin film, whose thickness is in units of so many nanometres. Ours covers all or nothing."""
+    tree = times(s.tree(thickness), nanometres)
+    if weight is not None:
+        share = s.constant(weight)
+        if share is None:
+            s.note(weight, "a film covers all of a texel or nothing here: all where this is 0.5 or more")
+            tree = applied(
+                "ifgreatereq", 1, value1=s.tree(weight), value2=constant(HALF), in1=tree, in2=constant(0.0)
+            )
+        elif share[0] < HALF:
+            if share[0] > 0:
+                s.note(
+                    weight,
+                    f"a film that covers a part of the surface is not supported; of {share[0]:g} it is left out",
+                )
+            return
+        elif share[0] < 1:
+            s.note(
+                weight, f"a film that covers a part of the surface is not supported; of {share[0]:g} it covers all"
+            )
+    if not s.is_black(tree):
+        s.put("film_thickness", thickness, tree, 0.0)
+    if "film_thickness" in s.material:
+        s.put("film_ior", ior, s.tree(ior), 1.4)
 
 
 def _under_coat(s: Surface, base: Tree, weight: str, color: str) -> Tree:

@@ -4,7 +4,7 @@ is a tree, as in `models`. The tables of docs/files.md say the same in words.
 
 from __future__ import annotations
 
-from service.assets.materialx.surface import FILM, NITS, Surface
+from service.assets.materialx.surface import NITS, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -108,6 +108,10 @@ def standard_surface(s: Surface) -> None:
         _set(s, "transmission_color", "transmission_color")
         if s.is_used("transmission_dispersion", 0):
             _disperse(s, 1.0, s.number("transmission_dispersion", 0))
+    if s.is_used("thin_film_thickness", 0):
+        s.material["thin_film_weight"] = 1.0
+        s.put("thin_film_thickness", "thin_film_thickness", times(s.tree("thin_film_thickness"), 1e-3), 0.5)
+        s.put("thin_film_ior", "thin_film_IOR", s.tree("thin_film_IOR"), 1.4)
     if s.is_set("thin_walled"):
         s.material["geometry_thin_walled"] = True
     if s.is_used("coat", 0):
@@ -123,7 +127,6 @@ def standard_surface(s: Surface) -> None:
     s.lose([
         ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
-        ("thin_film_thickness", 0, FILM),
     ])  # fmt: skip
 
 

@@ -21,6 +21,7 @@ RANGES = {
     "ior": (1.0, 4.0), "attenuation_distance": (1e-9, 1e9), "anisotropic_rotation": (-1e9, 1e9),
     "specular_weight": (0.0, BRIGHTEST), "specular_ior": (1e-3, 1e3), "coat_ior": (1e-3, 1e3),
     "thin_film_ior": (1e-3, 1e3), "thin_film_thickness": (0.0, BRIGHTEST),
+    "film_ior": (1.0, 4.0), "film_thickness": (0.0, 1e4),
     "emission_luminance": (0.0, 1e9),
 }  # fmt: skip
 COLORS = (
@@ -28,7 +29,6 @@ COLORS = (
     "coat_color", "fuzz_color", "emission_color", "diffuse_transmission_color",
 )  # fmt: skip
 NITS = 1 / 683  # watts of a lumen
-FILM = "thin films are not supported and are left out"
 TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
 
 

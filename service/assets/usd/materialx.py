@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.assets.usd.material_reader import Reader
+from service.scene.numbers import LARGEST
 
 NITS = 1 / 683  # watts of a lumen
 WHITE = (1.0, 1.0, 1.0)
+HALF = 0.5  # a film that covers so much is nearer to a whole one than to none
+THICKEST, MICROMETRE = 1e4, 1e3  # nm
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,9 @@ class Names:
     coat_roughness: tuple[str, float]
     coat_normal: str
     sheen: tuple[str, str, str, float]  # weight, colour, roughness and the latter's default
+    film: tuple[str, str, float, str | None]  # thickness, index and its default, weight
+    thin: str
+    scattered: tuple[str, str, float]  # the weight of what is scattered inside, its colour and that one's default
     emission: tuple[str, float, float]  # strength, its default, and the radiance of 1
     opacity: str
     normal: str
@@ -39,25 +45,24 @@ class Names:
 STANDARD = Names(
     "base", "base_color", (0.8,) * 3, "metalness", ("specular_roughness", 0.2), "specular", "specular_color",
     "specular_IOR", "transmission", "coat", ("coat_roughness", 0.1), "coat_normal",
-    ("sheen", "sheen_color", "sheen_roughness", 0.3), ("emission", 0.0, 1.0), "opacity", "normal",
+    ("sheen", "sheen_color", "sheen_roughness", 0.3), ("thin_film_thickness", "thin_film_IOR", 1.5, None),
+    "thin_walled", ("subsurface", "subsurface_color", 1.0), ("emission", 0.0, 1.0), "opacity", "normal",
     "specular_anisotropy",
     (
-        ("subsurface", 0.0, "subsurface scattering"), ("thin_film_thickness", 0.0, "a thin film"),
         ("diffuse_roughness", 0.0, "a rough diffuse base"), ("transmission_scatter", 0.0, "scattering inside"),
-        ("transmission_dispersion", 0.0, "dispersion"), ("coat_color", 1.0, "a coloured coat"),
-        ("coat_anisotropy", 0.0, "an anisotropic coat"), ("thin_walled", 0.0, "a thin wall"),
+        ("coat_color", 1.0, "a coloured coat"), ("coat_anisotropy", 0.0, "an anisotropic coat"),
     ),
 )  # fmt: skip
 OPEN_PBR = Names(
     "base_weight", "base_color", (0.8,) * 3, "base_metalness", ("specular_roughness", 0.3), "specular_weight",
     "specular_color", "specular_ior", "transmission_weight", "coat_weight", ("coat_roughness", 0.0),
     "geometry_coat_normal", ("fuzz_weight", "fuzz_color", "fuzz_roughness", 0.5),
-    ("emission_luminance", 0.0, NITS), "geometry_opacity", "geometry_normal", "specular_roughness_anisotropy",
+    ("thin_film_thickness", "thin_film_ior", 1.4, "thin_film_weight"), "geometry_thin_walled",
+    ("subsurface_weight", "subsurface_color", 0.8), ("emission_luminance", 0.0, NITS), "geometry_opacity",
+    "geometry_normal", "specular_roughness_anisotropy",
     (
-        ("subsurface_weight", 0.0, "subsurface scattering"), ("thin_film_weight", 0.0, "a thin film"),
         ("base_diffuse_roughness", 0.0, "a rough diffuse base"), ("transmission_scatter", 0.0, "scattering inside"),
-        ("transmission_dispersion_scale", 0.0, "dispersion"), ("coat_color", 1.0, "a coloured coat"),
-        ("coat_roughness_anisotropy", 0.0, "an anisotropic coat"), ("geometry_thin_walled", 0.0, "a thin wall"),
+        ("coat_color", 1.0, "a coloured coat"), ("coat_roughness_anisotropy", 0.0, "an anisotropic coat"),
     ),
 )  # fmt: skip
 SURFACES = {"ND_standard_surface_surfaceshader": STANDARD, "ND_open_pbr_surface_surfaceshader": OPEN_PBR}
@@ -75,6 +80,8 @@ def materialx_surface(read: Reader) -> dict[str, Any]:
     _set(out, "anisotropic", read.scalar(names.anisotropy, 0.0), 0.0)
     _specular(read, names, out)
     _transmission(read, names, out)
+    _scattered(read, names, out)
+    _film(read, names, out)
     coat = read.scalar(names.coat, 0.0)
     if coat:
         out["clearcoat"] = coat
@@ -112,11 +119,14 @@ def _specular(read: Reader, names: Names, out: dict[str, Any]) -> None:
 
 def _transmission(read: Reader, names: Names, out: dict[str, Any]) -> None:
     """Glass: its colour tints at once, or over a depth."""
+    if is_thin := read.constant(names.thin, 0.0) > 0:
+        out["thin_walled"] = True
     share = read.scalar(names.transmission, 0.0)
     if not share:
         return
     out["transmission"] = share
-    depth = read.constant("transmission_depth", 0.0, 1e9)
+    _disperse(read, names, out)
+    depth = 0.0 if is_thin else read.constant("transmission_depth", 0.0, 1e9)
     color = read.color("transmission_color", WHITE)
     if depth > 0 and isinstance(color, list):
         out["attenuation_distance"], out["attenuation_color"] = max(depth, 1e-9), color
@@ -126,6 +136,57 @@ def _transmission(read: Reader, names: Names, out: dict[str, Any]) -> None:
     elif color != list(WHITE):
         place = read.surface.at("transmission_color")
         read.notes.add(place, "a tint of the transmission alone is not supported; that of the base is used")
+
+
+def _disperse(read: Reader, names: Names, out: dict[str, Any]) -> None:
+    """By an Abbe number, or by one and the share of the dispersion that it stands for."""
+    if names is STANDARD:
+        abbe, share = read.constant("transmission_dispersion", 0.0, LARGEST), 1.0
+    else:
+        abbe = read.constant("transmission_dispersion_abbe_number", 20.0, LARGEST)
+        share = read.constant("transmission_dispersion_scale", 0.0)
+    if abbe > 0 and share > 0:
+        out["abbe"] = min(abbe / share, LARGEST)
+
+
+def _scattered(read: Reader, names: Names, out: dict[str, Any]) -> None:
+    """Of light that is scattered inside, what leaves a thin wall on its other side: all of it in Standard Surface,
+    half of it in OpenPBR, more where it goes forwards; the rest comes back."""
+    weight, color, default = names.scattered
+    share = read.constant(weight, 0.0) if read.surface.has(weight) else 0.0
+    if share == 0:
+        return
+    if "thin_walled" not in out:
+        read.notes.add(read.surface.at(weight), "subsurface scattering is not supported and is left out")
+        return
+    forwards = 1.0
+    if names is OPEN_PBR:
+        forwards = 0.5 + 0.5 * read.constant("subsurface_scatter_anisotropy", 0.0, 1.0, -1.0)
+    through, own = share * forwards, read.color(color, (default,) * 3)
+    out["diffuse_transmission"], out["diffuse_transmission_color"] = through, own
+    if through == share:
+        return
+    back, base = (share - through) / (1 - through), out["base_color"]
+    if isinstance(own, list) and isinstance(base, list):
+        out["base_color"] = [a + back * (b - a) for a, b in zip(base, own, strict=True)]
+    else:
+        detail = "of a wall with a texture the colour that comes back is that of the base"
+        read.notes.add(read.surface.at(color), detail)
+
+
+def _film(read: Reader, names: Names, out: dict[str, Any]) -> None:
+    """A thin film, in nanometres in Standard Surface and in micrometres in OpenPBR. Ours covers all or nothing."""
+    thickness, ior, default, weight = names.film
+    share, unit, own = (1.0, 1.0, 0.0) if weight is None else (read.constant(weight, 0.0), MICROMETRE, 0.5)
+    if weight is not None and 0 < share < 1:
+        how = "covers all" if share >= HALF else "is left out"
+        detail = f"a film that covers a part of the surface is not supported; of {share:g} it {how}"
+        read.notes.add(read.surface.at(weight), detail)
+    found = read.scalar(thickness, own, THICKEST / unit) if share >= HALF else 0.0
+    if found:
+        is_texture = isinstance(found, dict)
+        out["film_thickness"] = scaled(found, unit) if is_texture else round(found * unit, 6)
+        out["film_ior"] = read.constant(ior, default, 4.0, 1.0)
 
 
 def scaled(value: Any, factor: float, most: float = 1.0) -> Any:

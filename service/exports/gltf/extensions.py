@@ -85,7 +85,9 @@ def _transmission(of: MaterialWriter) -> Tree:
         if shade != WHITE:
             volume["attenuationColor"] = [min(each, 1.0) for each in shade]
     if m.abbe is not None:
-        found |= of.builder.extension("KHR_materials_dispersion", {"dispersion": SHOWN_ABBE / max(m.abbe, LEAST_ABBE)})
+        found |= of.builder.extension(
+            "KHR_materials_dispersion", {"dispersion": SHOWN_ABBE / max(m.abbe, LEAST_ABBE)}
+        )
     return found | of.builder.extension("KHR_materials_volume", volume)
 
 

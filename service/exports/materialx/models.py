@@ -44,6 +44,9 @@ def standard_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
         made |= _sheen(m, graph)
     if _is_used(m.clearcoat):
         made |= _coat(m, graph)
+    if _is_used(m.film_thickness):
+        thickness = graph.number(m.film_thickness, "film_thickness")
+        made |= {"thin_film_thickness": thickness, "thin_film_IOR": graph.number(m.film_ior, "film_ior")}
     if _shines(m):
         made |= {"emission": number(1.0), "emission_color": graph.color(m.emission, "emission")}
     if m.alpha != 1:
@@ -141,6 +144,9 @@ def _tell_others(m: PrincipledMaterial, graph: Graph) -> None:
         graph.tell("subsurface", "a flatter diffuse reflection is not written")
     if m.alpha_cutoff is not None:
         graph.tell("alpha_cutoff", "the model has no cut-off; the opacity is written without it")
+    if m.conductor_eta is not None:
+        for name in ("conductor_eta", "conductor_k"):
+            graph.tell(name, "the model has no index of metals; the base colour is written")
     _tell_common(m, graph, _shines(m))
 
 

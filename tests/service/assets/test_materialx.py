@@ -45,17 +45,20 @@ def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> 
              value("thin_film_thickness", 300), value("diffuse_roughness", 0.2)],
             {"base_color": [0.4, 0.2, 0.1], "roughness": 0.35, "ior": 1.7, "anisotropic": 0.5,
              "anisotropic_rotation": 90.0, "sheen": 0.3, "sheen_color": [1.0, 0.5, 0.0], "sheen_roughness": 0.3,
-             "clearcoat": 0.5, "clearcoat_roughness": 0.05, "emission": [2.0, 4.0, 6.0], "alpha": 0.5},
-            {"SM/thin_film_thickness", "SM/diffuse_roughness"},
+             "clearcoat": 0.5, "clearcoat_roughness": 0.05, "emission": [2.0, 4.0, 6.0], "alpha": 0.5,
+             "film_thickness": 300.0, "film_ior": 1.5},
+            {"SM/diffuse_roughness"},
         ),
         (
             "open_pbr_surface",
             [value("base_color", [0.5, 0.25, 0.75]), value("specular_roughness", 0.2),
              value("transmission_weight", 1), value("transmission_color", [0.9, 0.8, 0.7]),
              value("transmission_depth", 0.25),
-             value("transmission_dispersion_scale", 0.5), value("emission_luminance", 683)],
+             value("transmission_dispersion_scale", 0.5), value("emission_luminance", 683),
+             value("thin_film_weight", 1), value("thin_film_thickness", 0.35), value("thin_film_ior", 1.8)],
             {"base_color": 1.0, "roughness": 0.2, "transmission": 1.0, "attenuation_distance": 0.25,
-             "attenuation_color": [0.9, 0.8, 0.7], "emission": 1.0, "abbe": 40.0},
+             "attenuation_color": [0.9, 0.8, 0.7], "emission": 1.0, "abbe": 40.0,
+             "film_thickness": 350.0, "film_ior": 1.8},
             set(),
         ),
         (
@@ -63,9 +66,10 @@ def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> 
             [value("base_color", [0.1, 0.2, 0.3]), value("metallic", 0), value("roughness", 0.6), value("alpha", 0.4),
              value("alpha_mode", 1, "integer"), value("alpha_cutoff", 0.3), value("sheen_color", [0.2, 0.1, 0]),
              value("sheen_roughness", 0.7), value("clearcoat", 1), value("clearcoat_roughness", 0.2),
-             value("iridescence", 1)],
+             value("iridescence", 0.75), value("iridescence_ior", 1.6)],
             {"base_color": [0.1, 0.2, 0.3], "roughness": 0.6, "sheen": 1.0, "sheen_color": [0.2, 0.1, 0.0],
-             "sheen_roughness": 0.7, "clearcoat": 1.0, "clearcoat_roughness": 0.2, "alpha": 0.4, "alpha_cutoff": 0.3},
+             "sheen_roughness": 0.7, "clearcoat": 1.0, "clearcoat_roughness": 0.2, "alpha": 0.4, "alpha_cutoff": 0.3,
+             "film_thickness": 100.0, "film_ior": 1.6},
             {"SM/iridescence"},
         ),
         (
@@ -290,14 +294,14 @@ def test_a_graph_that_takes_too_long_is_made_smaller_or_left_out(monkeypatch: py
 def test_a_mtlx_in_a_texture_set_wins_and_two_files_are_told_apart(store: AssetStore) -> None:
     image = node("image", "img", "color3", value("file", "Oak_Color.png", "filename", colorspace="srgb_texture"))
     made = mtlx(graph(image, out="img color3"), surface("gltf_pbr", from_graph("base_color", "out"), name="Oak"))
-    other = mtlx(surface("gltf_pbr", value("iridescence", 1), name="Oak"))
+    other = mtlx(surface("gltf_pbr", value("occlusion", 0.5), name="Oak"))
     files = {"Oak.mtlx": made, "Oak_Color.png": make.png(NOISY), "Oak_Roughness.png": make.png(NOISY)}
     assert material(taken(store, files))["roughness"] == 1, (
         "as the file has it, though an image would fit by its name"
     )
     both = taken(store, {**files, "b/other.mtlx": other})
     assert list(both.document["materials"]) == ["Oak", "Oak 2"]
-    assert losses(both) == {"b/other.mtlx/SOak/iridescence"}
+    assert losses(both) == {"b/other.mtlx/SOak/occlusion"}
 
 
 def test_it_is_served_and_a_file_is_no_mesh(server: Server) -> None:

@@ -110,3 +110,29 @@ def test_a_thin_film_comes_along(store: AssetStore) -> None:
     imported = taken(store, mtlx(surface("open_pbr_surface", *(value(name, x) for name, x in film.items()))))
     assert material(imported) == {"type": "openpbr", **{name: pytest.approx(x) for name, x in film.items()}}
     assert not imported.warnings
+
+
+def test_films_of_standard_surface(store: AssetStore) -> None:
+    """As `openpbr`, where a coloured coat makes it one."""
+    film = [value("thin_film_thickness", 420), value("thin_film_IOR", 1.7)]
+    coat = [value("coat", 1), value("coat_color", [0.9, 0.5, 0.2]), value("coat_roughness", 0)]
+    imported = taken(store, mtlx(surface("standard_surface", *film, *coat)))
+    found = material(imported)
+    assert (found["type"], found["thin_film_weight"]) == ("openpbr", 1)
+    assert (found["thin_film_thickness"], found["thin_film_ior"]) == (pytest.approx(0.42), pytest.approx(1.7))
+    assert not imported.warnings
+
+
+def test_a_part_of_a_film_is_all_or_nothing_on_principled(store: AssetStore) -> None:
+    for share, thickness in ((0.3, None), (0.6, 550)):
+        inputs = [value("iridescence", share), value("iridescence_thickness", 550)]
+        imported = taken(store, mtlx(surface("gltf_pbr", *inputs)))
+        assert material(imported).get("film_thickness") == thickness and losses(imported) == {"SM/iridescence"}
+    stripes = graph(node("ramplr", "ramp", "float", value("valuel", 0.0), value("valuer", 1.0)), share="ramp float")
+    shader = surface("gltf_pbr", from_graph("iridescence", "share", "float"), value("iridescence_thickness", 550))
+    imported = taken(store, mtlx(stripes, shader))
+    thickness = material(imported)["film_thickness"]
+    image = store.image(imported.document["textures"][thickness["texture"]]["asset"]).pixels
+    row = image[image.shape[0] // 2, :, 0] / image.max() * thickness["factor"]
+    half = len(row) // 2
+    assert row[: half - 1].max() == 0 and row[half + 1 :] == pytest.approx(550, rel=1e-3)

@@ -178,6 +178,7 @@ STANDARD = """
         float inputs:emission = 3
         color3f inputs:emission_color = (1, 0.5, 0)
         float inputs:thin_film_thickness = 400
+        float inputs:diffuse_roughness = 0.25
 """
 OPEN_PBR = """
         float inputs:base_weight = 1
@@ -212,12 +213,52 @@ def test_standard_surface_and_openpbr(store: AssetStore) -> None:
     assert found["base_color"] == pytest.approx([0.4, 0.2, 0.1]) and found["metallic"] == 1
     assert found["roughness"] == 0.35 and found["clearcoat"] == 0.5 and found["clearcoat_roughness"] == 0.2
     assert found["emission"] == [3, 1.5, 0]
-    assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:thin_film_thickness"]
+    assert (found["film_thickness"], found["film_ior"]) == (400, 1.5)
+    assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:diffuse_roughness"]
     glass = material("Look", OPEN_PBR, kind="ND_open_pbr_surface_surfaceshader", output="mtlx:surface")
     found, scene = worn(store, glass)
     assert found["transmission"] == 1 and found["ior"] == pytest.approx(1.33)
     assert found["attenuation_distance"] == 0.5 and found["attenuation_color"] == [0.2, 0.9, 0.4]
     assert found["base_color"] == [1, 1, 1] and not scene.warnings
+
+
+def test_films_dispersion_and_thin_walls_of_materialx(store: AssetStore) -> None:
+    def read(inputs: str, kind: str) -> tuple[dict[str, Any], list[str]]:
+        lines = "\n".join(f"        {line.strip()}" for line in inputs.split(";"))
+        shader = material("Look", lines, kind=f"ND_{kind}_surfaceshader", output="mtlx:surface")
+        found, scene = worn(store, shader)
+        return found, [warning["pointer"] for warning in scene.warnings]
+
+    film = (
+        "float inputs:thin_film_weight = {}; float inputs:thin_film_thickness = 0.35; float inputs:thin_film_ior = 2"
+    )
+    found, told = read(film.format(1), "open_pbr_surface")
+    assert (found["film_thickness"], found["film_ior"], told) == (350, 2, [])
+    found, told = read(film.format(0.25), "open_pbr_surface")
+    assert "film_thickness" not in found and told == ["/Look/S.inputs:thin_film_weight"]
+    glass = "float inputs:transmission_weight = 1; float inputs:transmission_dispersion_scale = 0.5"
+    found, told = read(glass, "open_pbr_surface")
+    assert (found["abbe"], told) == (40, [])
+    found, told = read("float inputs:transmission = 1; float inputs:transmission_dispersion = 33", "standard_surface")
+    assert (found["abbe"], told) == (33, [])
+    pane = "float inputs:transmission = 1; bool inputs:thin_walled = 1; float inputs:transmission_depth = 2"
+    found, told = read(pane, "standard_surface")
+    assert (found["thin_walled"], found["transmission"], told) == (True, 1, [])
+    assert "attenuation_distance" not in found and found["base_color"] == [1, 1, 1]
+    leaf = "bool inputs:thin_walled = 1; float inputs:subsurface = 0.4; color3f inputs:subsurface_color = (0.5, 1, 0)"
+    found, told = read(leaf, "standard_surface")
+    assert (found["diffuse_transmission"], found["diffuse_transmission_color"], told) == (0.4, [0.5, 1, 0], [])
+    paper = (
+        "bool inputs:geometry_thin_walled = 1; float inputs:subsurface_weight = 0.5;"
+        "color3f inputs:subsurface_color = (1, 1, 0); color3f inputs:base_color = (0, 0.2, 0.4)"
+    )
+    found, told = read(paper, "open_pbr_surface")
+    assert (found["diffuse_transmission"], told) == (0.25, [])
+    # What comes back: half of it the base's, and of the other half one in two.
+    back = np.array([0, 0.2, 0.4]) * 0.5 + np.array([1, 1, 0]) * 0.25
+    assert 0.75 * np.array(found["base_color"]) == pytest.approx(back)
+    found, told = read("float inputs:subsurface = 0.4", "standard_surface")
+    assert told == ["/Look/S.inputs:subsurface"] and "diffuse_transmission" not in found
 
 
 def test_images_of_materialx_and_losses_that_the_preview_does_not_have(store: AssetStore) -> None:

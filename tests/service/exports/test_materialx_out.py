@@ -35,6 +35,8 @@ GLASS = {
     "type": "principled", "base_color": 1.0, "roughness": 0.1, "ior": 1.33, "transmission": 1.0,
     "attenuation_color": [0.9, 0.5, 0.25], "attenuation_distance": 0.125, "abbe": 40.0,
 }  # fmt: skip
+FILM = {"type": "principled", "base_color": [0.5, 0.25, 0.125], "roughness": 0.2, "metallic": 1.0,
+        "film_thickness": 312.5, "film_ior": 1.75}  # fmt: skip
 TINTED = {"type": "principled", "base_color": [0.2, 0.1, 0.9], "roughness": 0.2, "transmission": 1.0}
 PANE = {"type": "principled", "base_color": [0.9, 1.0, 0.8], "roughness": 0.3, "transmission": 1.0, "ior": 1.45,
         "thin_walled": True}  # fmt: skip
@@ -51,6 +53,7 @@ OPENPBR = {
     "fuzz_color": [0.3, 0.2, 0.1], "fuzz_roughness": 0.6, "emission_luminance": 500.0,
     "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8, "geometry_tangent": [0.6, -0.8, 0.0],
     "geometry_coat_tangent": [-1.0, 0.0, 0.0], "geometry_thin_walled": True,
+    "thin_film_weight": 0.5, "thin_film_thickness": 0.35, "thin_film_ior": 2.2,
 }  # fmt: skip
 TEXTURES = {
     "coat": {"asset": "", "color_space": "srgb", "wrap": "mirror", "scale": [2.0, -4.0], "rotation": 30.0,
@@ -62,6 +65,7 @@ TEXTURED = {
     "roughness": {"texture": "data", "channel": "g", "factor": 0.5}, "metallic": {"texture": "data", "channel": "b"},
     "alpha": {"texture": "data", "channel": "a"}, "normal_map": {"texture": "data", "scale": 0.5},
     "emission": {"texture": "coat", "factor": 3.0},
+    "film_thickness": {"texture": "data", "channel": "b", "factor": 600.0}, "film_ior": 1.6,
 }  # fmt: skip
 OPENPBR_TEXTURED = {
     "type": "openpbr", "base_color": {"texture": "coat", "factor": [0.5, 1.0, 0.25]},
@@ -108,7 +112,9 @@ def same(found: Any, wanted: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "material", [FULL, GLASS, TINTED, PANE, LEAF, OPENPBR], ids=["all", "glass", "tinted", "pane", "leaf", "openpbr"]
+    "material",
+    [FULL, GLASS, FILM, TINTED, PANE, LEAF, OPENPBR],
+    ids=["all", "glass", "film", "tinted", "pane", "leaf", "openpbr"],
 )
 def test_a_material_is_the_same_when_it_is_read_again(store: AssetStore, material: dict[str, Any]) -> None:
     exported = written(store, {"m": material})
@@ -144,6 +150,9 @@ def test_each_model_has_its_own_node_and_the_rest_is_told(store: AssetStore) -> 
     }  # fmt: skip
     wanted = {name: value for name, value in turned.items() if name != "subsurface"}
     same(again(exported).document["materials"]["brushed_metal"], wanted)
+    gold = {"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": [3.4, 2.4, 1.8]}
+    lost = {pointer for pointer, _ in written(store, {"m": gold}).losses}
+    assert lost == {"/materials/m/conductor_eta", "/materials/m/conductor_k"}
     other = written(store, {"m": {"type": "diffuse", "albedo": 0.5}})
     assert "/materials/m/type" in {pointer for pointer, _ in other.losses}
 
