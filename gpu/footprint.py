@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpu.arrays import SceneArrays
-from gpu.layout.pixel_layers import ACCUMULATOR_BYTES, COVER_BYTES, FIRST_HIT_BYTES, PLAN_BYTES
+from gpu.layout.pixel_layers import ACCUMULATOR_BYTES, COVER_BYTES, FIRST_HIT_BYTES, PLAN_BYTES, SPLAT_BYTES
 from gpu.settings import RenderSettings
 
 FIXED_BYTES = 1 << 20  # bytes of every picture, whatever its size: the noise meter's buffers and small ones
@@ -36,4 +36,6 @@ def picture_bytes(settings: RenderSettings, guided: bool = False, covered: bool 
     with coverage, or without. A block of samples takes memory from sample 9 on."""
     block = PLAN_BYTES if settings.adaptive else ACCUMULATOR_BYTES
     pixel_bytes = ACCUMULATOR_BYTES + block + (FIRST_HIT_BYTES if guided else 0) + (COVER_BYTES if covered else 0)
+    if settings.caustics != "paths" and not settings.adaptive:
+        pixel_bytes += SPLAT_BYTES
     return settings.width * settings.height * pixel_bytes + FIXED_BYTES

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 ESTIMATORS = ("mis", "bsdf", "light", "uniform")
+CAUSTICS = ("light", "paths", "auto")
 SAMPLERS = ("sobol", "independent")
 FILTERS = ("box", "tent", "gaussian", "blackman_harris")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
@@ -23,7 +24,9 @@ AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS, "incidence")
 @dataclass(frozen=True)
 class RenderSettings:
     """The size is in pixels. `clamp` bounds the radiance of indirect light (None: unbiased). With `adaptive` a
-    pixel's samples follow its noise (gpu/picture/sample_plan.py), and a picture's number of samples is their mean."""
+    pixel's samples follow its noise (gpu/picture/sample_plan.py), and a picture's number of samples is their mean.
+    `caustics` says whether they are traced from the lights or found by the camera's paths ("auto": see
+    `features.traces_caustics`)."""
 
     width: int
     height: int
@@ -35,3 +38,4 @@ class RenderSettings:
     seed: int = 0
     clamp: float | None = None
     adaptive: bool = False
+    caustics: str = "paths"

@@ -1,6 +1,8 @@
 """From a scene to compiled kernels: the flags of the code that it needs, the shader text, the compiled result.
 
 flag_table      a row for each flag: what needs it, and which sliders raise it
+caustics        what paths of light begin with: lights, and targets that mirror or refract
+deltas          which materials are perfectly specular
 features        what kernels are compiled with: a scene's flags before and after edits, its numbers of records
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL

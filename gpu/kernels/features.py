@@ -13,6 +13,7 @@ from gpu.kernels import textures_glsl
 from gpu.kernels.flag_table import ANYWHERE, FLAGS, SHAPES, beside, looped_count
 from gpu.layout import ShapeKind
 from gpu.layout.models import TABULATED, TRANSMITTING
+from gpu.layout.pixel_layers import SPLAT_BYTES
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
@@ -74,6 +75,21 @@ def needs_tables(raised: Container[str]) -> bool:
     return any(model.lobes_flag in raised for model in TABULATED)
 
 
+# Units, to a picture's scale of radiance, in which light is summed that comes to a pixel from elsewhere. 64 bits hold
+# eight million times that radiance.
+SPLAT_UNITS = 2.0**40
+# Pixels whose sums every driver can bind at once, as light may come to any of them.
+MOST_SPLATTED = (1 << 27) // SPLAT_BYTES
+
+
+def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
+    """Whether caustics are traced from the lights. With "auto" they are where that errs less at equal time; never
+    where samples follow what was found, and not in pictures that a kernel cannot bind as a whole."""
+    able = not settings.adaptive and settings.width * settings.height <= MOST_SPLATTED
+    flag = {"light": "HAS_CAUSTICS", "auto": "HAS_SHARP_CAUSTICS"}.get(settings.caustics)
+    return able and flag is not None and flag in raised
+
+
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
 # varying index. 0: they are too many for that to gain time, or in the tree. docs/house.md says what each gains.
 COUNTS = {f"{kind.name}_COUNT": kind for kind in SHAPES}
@@ -123,7 +139,7 @@ def defines(
 ) -> dict[str, object]:
     """The defines of a kernel: every flag as 0 or 1, numbers of records, what any of its models can do, and the
     settings that are compiled in."""
-    out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
+    out: dict[str, object] = {name: int(name in raised) for name, flag in FLAGS.items() if not flag.of_settings}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
@@ -134,6 +150,9 @@ def defines(
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)
     out["ADAPTIVE"] = int(settings is not None and settings.adaptive)
     out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
+    out["CAUSTICS"] = int(settings is not None and traces_caustics(raised, settings))
+    out["REVERSED"] = 0
+    out["SPLAT_UNITS"] = f"{SPLAT_UNITS:.1f}"
     out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
     out["LOBE_CHOICE"] = 0
     out["OPACITY_WALK"] = 1

@@ -13,10 +13,11 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
-from gpu.kernels import textures_glsl
+from gpu.kernels import caustics, textures_glsl
+from gpu.kernels.deltas import mirrors, transmits
 from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
-from gpu.layout.models import BY_NUMBER, COATED, DELTA, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
+from gpu.layout.models import BY_NUMBER, COATED, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
 Asks = Callable[[SceneArrays], bool]
 ANYWHERE = ("any scene",)  # in place of the names of flags
@@ -54,6 +55,7 @@ class Flag:
     in_general: bool = True  # the kernel for many scenes supports it
     spares: bool = False  # it saves work and changes no picture, so that no edit waits for the compiler to raise it
     of_camera: bool = False  # the camera alone decides
+    of_settings: bool = False  # kernels have no code by this name: with a setting it decides on another define
 
 
 def beside(names: tuple[str, ...], raised: frozenset[str]) -> bool:
@@ -122,29 +124,13 @@ def _term(kind: str, value: int) -> Asks:
     return lambda s: bool((_records(s, "microfacet")[kind] == value).any())
 
 
-def _transmits(materials: np.ndarray) -> np.ndarray:
-    m = materials
-    through = (m["transmission"] > 0) | ((m["thin_walled"] > 0) & (m["diffuse_transmission"] > 0))
-    out: np.ndarray = of(m, TRANSMITTING) & through & (m["metallic"] < 1)
-    return out
-
-
 def _thin_walls(s: SceneArrays) -> bool:
-    return bool((_transmits(s.materials) & (s.materials["thin_walled"] > 0)).any())
+    return bool((transmits(s.materials) & (s.materials["thin_walled"] > 0)).any())
 
 
 def _disperses(s: SceneArrays) -> bool:
     parts = (s.materials["dispersion"] > 0) & ~(s.materials["thin_walled"] > 0)
-    return bool((_transmits(s.materials) & parts).any())
-
-
-def _mirrors(materials: np.ndarray) -> np.ndarray:
-    """Materials that only mirror or refract, by their own numbers; textures may add others, or take some away."""
-    m = materials
-    whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
-    bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
-    out: np.ndarray = of(m, DELTA) & (m["roughness"] < layout.LEAST_ROUGHNESS) & whole & bare
-    return out
+    return bool((transmits(s.materials) & parts).any())
 
 
 def _filmed(materials: np.ndarray) -> np.ndarray:
@@ -159,14 +145,14 @@ def _spreads(s: SceneArrays, model: Model) -> bool:
     clear glass, so that their paths take the short loop of path/delta_chain.glsl."""
     m = s.materials
     given = of(m, (model,))
-    sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
-    spared = (sure & _transmits(m)).any() and not _normal_mapped(s)
+    sure = mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
+    spared = (sure & transmits(m)).any() and not _normal_mapped(s)
     return bool(given.any() and (not spared or (given & ~sure).any()))
 
 
 def _attenuates(s: SceneArrays) -> bool:
     m = s.materials
-    return bool((_transmits(m) & (m["thin_walled"] == 0) & (m["attenuation_distance"] > 0)).any())
+    return bool((transmits(m) & (m["thin_walled"] == 0) & (m["attenuation_distance"] > 0)).any())
 
 
 def _slot_flags(scene: SceneArrays) -> np.ndarray:
@@ -380,10 +366,10 @@ _ROWS = (
     # It adds a fifth to the time of a sample of `principled`.
     Flag(
         "HAS_TRANSMISSION",
-        lambda s: bool(_transmits(s.materials).any()),
+        lambda s: bool(transmits(s.materials).any()),
         compiled_with=_flags_of(TRANSMITTING),
     ),
-    Flag("HAS_MIRRORS", lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()), spares=True),
+    Flag("HAS_MIRRORS", lambda s: bool((transmits(s.materials) & mirrors(s.materials)).any()), spares=True),
     Flag(
         "HAS_THIN_WALLS",
         _thin_walls,
@@ -392,6 +378,9 @@ _ROWS = (
         in_general=False,
     ),
     Flag("HAS_DISPERSION", _disperses, previewed=_any_of(TRANSMITTING), in_general=False),
+    # They raise no code: `features.defines` asks for caustics where a setting does not forbid them.
+    Flag("HAS_CAUSTICS", caustics.may_throw, previewed=_always, of_settings=True),
+    Flag("HAS_SHARP_CAUSTICS", caustics.throws, previewed=_always, of_settings=True),
     Flag("HAS_ATTENUATION", _attenuates, previewed=_any_of(TRANSMITTING)),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

@@ -33,6 +33,9 @@ class Slot(IntEnum):
     COUNTERS = 13
     SAMPLE_PLAN = 14
     PLANNED_AREAS = 15
+    # lighttrace.comp
+    SPLATS = 10
+    LIGHT_SOURCES = 14
     # meter.comp
     METER_PLACES = 14
     # resolve.comp: tables of displays and looks

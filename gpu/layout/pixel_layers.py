@@ -15,4 +15,5 @@ COVER_VECTORS = COVER_RANKS // 2
 ACCUMULATOR_BYTES = VECTOR_BYTES * len(ACCUMULATORS)
 FIRST_HIT_BYTES = VECTOR_BYTES * len(FIRST_HIT)
 COVER_BYTES = VECTOR_BYTES * COVER_VECTORS * len(COVER)
+SPLAT_BYTES = 32  # of light that comes from elsewhere: four numbers of 64 bits; where caustics are traced from lights
 PLAN_BYTES = 1  # of the plan of `adaptive`, about: it has words of areas, not of pixels

@@ -5,6 +5,7 @@ blocks        the parts into which a picture's samples are cut, and how their su
 accumulators  sums of samples on the device
 bands         parts of a block that different renderers trace
 shared_block  a block that several renderers trace: shared, traced and written in bands, completed
+light_paths   caustics, traced from the lights: their sums and the error of these
 passes        which samples are traced next, slice by slice
 schedule      the protocol of `tiles` and `adaptive`, which cut a pass into dispatches
 tiles         how a pass is cut, by the measured cost of each band of rows

@@ -28,6 +28,15 @@ def profile(name: str, x: np.ndarray) -> np.ndarray:
 
 
 @cache
+def density(name: str, size: int) -> np.ndarray:
+    """The density along one axis, 1/pixel, at k / size of the radius, for k = 0 .. size: float32."""
+    x = np.linspace(0, RADIUS[name], 1 << 17)
+    w = profile(name, x)
+    total = 2 * np.sum(0.5 * (w[1:] + w[:-1])) * (x[1] - x[0])
+    return (profile(name, np.linspace(0, RADIUS[name], size + 1)) / total).astype(np.float32)
+
+
+@cache
 def inverse(name: str, size: int) -> np.ndarray:
     """The distances (pixels, float32) within which the half profile has 1 - (1 - k / size)^4 of its weight, for
     k = 0 .. size."""

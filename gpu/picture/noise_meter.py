@@ -91,19 +91,19 @@ class NoiseMeter:
         weights = np.concatenate(parts)
         return weights if side > 1 else around(weights)
 
-    def noise(self, sums: Accumulators, metered: bool, scale: float) -> float:
-        """Estimated RMSE of the picture's luminance over its mean; `metered`: the pixels were placed and sampled.
+    def error(self, sums: Accumulators, metered: bool, scale: float) -> tuple[float, float]:
+        """Estimated RMSE of the picture's luminance, and its mean; `metered`: the pixels were placed and sampled.
         Second moments are of radiance over `scale`."""
         pixels = self._size[0] * self._size[1]
         totals, seen = self._totals(sums, variance=not metered)
         mean = totals[0] / pixels
         if mean == 0:
-            return 0.0
+            return 0.0, 0.0
         if not metered:
-            return float(np.sqrt(totals[1] / pixels) * scale / mean)
+            return float(np.sqrt(totals[1] / pixels) * scale), float(mean)
         places, values = (self._vectors(slot) for slot in (Slot.MOMENTS, Slot.SUM))
         other = values[:, :3].astype(float) @ _LUMINANCE / np.maximum(places[:, 3], 1)
-        return float(np.sqrt(squared_error(places[:, :3], seen / mean, other / mean) / pixels))
+        return float(np.sqrt(squared_error(places[:, :3], seen / mean, other / mean) / pixels) * mean), float(mean)
 
     def _vectors(self, slot: Slot) -> np.ndarray:
         return np.frombuffer(self.buffers[slot].read(), np.float32).reshape(-1, 4)

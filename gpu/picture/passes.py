@@ -18,6 +18,7 @@ from gpu.picture.accumulators import Accumulators
 from gpu.picture.adaptive import Adaptive
 from gpu.picture.bands import BandTracer
 from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.light_paths import LightPaths
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
 from gpu.picture.tiles import MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
@@ -29,8 +30,11 @@ class Passes:
     """The progress of a picture, whose accumulators are `sums`. The meter's pixels are traced after each pass, and a
     block is merged after the pass that completes it."""
 
-    def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
+    def __init__(
+        self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter, light: LightPaths
+    ) -> None:
         self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
+        self._light = light
         self._kernel: Any = None
         self._schedule: Schedule | None = None
         self.compile_ms = 0.0  # since the picture was made
@@ -39,15 +43,17 @@ class Passes:
     def _begin_again(self) -> None:
         self.samples = 0  # of every pixel; in the mean, where the schedule is adaptive
         self._pass_samples = 0  # of the pass under way; 0: none
-        # The beginning of the next tile. The picture's rows are followed by the meter's, and these by the rows to
-        # merge.
+        # The beginning of the next tile. The picture's rows are followed by those of its paths of light, these by the
+        # meter's, and these by the rows to merge.
         self._row, self._column = 0, 0
 
     def reset(self) -> None:
         """Start at zero samples, with the present scene and settings. The accumulators are cleared."""
         d = self._dispatcher
         kernel = self._kernels.get("pathtrace.comp", d.scene.defines(d.settings))
-        self.compile_ms += self._kernels.last_compile_ms
+        compiled_ms = self._kernels.last_compile_ms
+        self.compile_ms += compiled_ms
+        light_ms = self._light.reset()
         if kernel is not self._kernel:
             self._kernels.hold(kernel)
             self._let_go()
@@ -55,8 +61,9 @@ class Passes:
             self._cut()
         elif self.schedule.max_bounces != d.settings.max_bounces:
             self._cut()
-        if self._kernels.last_compile_ms:
+        if compiled_ms:
             self._compile_fully()
+        self.compile_ms += light_ms + (self._light.compile_fully() if light_ms else 0.0)
         for buffer in self.schedule.buffers:
             buffer.clear()
         self.schedule.forget()
@@ -81,6 +88,7 @@ class Passes:
         self._row, self._column = self.schedule.resume(row, column)
         if self._pass_samples:
             self._begin_schedule()
+        self._count_light()
 
     def trace(self, budget_s: float, max_samples: int, sharers: int = 1) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
@@ -154,6 +162,7 @@ class Passes:
             self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples)
         if rates is not None:
             self._schedule.expect(rates)  # of another kernel: the best estimate
+        self._light_tiles = Tiles(*size, d.most_pixels, s.max_bounces, samples)
         self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
 
     def _compile_fully(self) -> None:
@@ -186,15 +195,19 @@ class Passes:
         self.schedule.begin(self.samples, self.samples + self._pass_samples, self._most_samples)
 
     def _slice(self) -> None:
-        """Trace the next tile of the pass, of the picture or of the meter, or merge some pixels of a block."""
+        """Trace the next tile of the pass, of the picture, its paths of light or the meter, or merge some pixels of a
+        block."""
         height, after = self.schedule.size[1], self.samples + self._pass_samples
-        metered = height
+        lit = height + self._light_rows
+        metered = lit
         if after >= noise_meter.FROM:
             metered += self._meter.lines * self.schedule.meter_rounds(noise_meter.FROM)
         if self._row < height:
             self._trace_picture()
+        elif self._row < lit:
+            self._trace_light(self._row - height)
         elif self._row < metered:
-            self._trace_meter()
+            self._trace_meter(self._row - lit)
         else:
             self._merge(self._row - metered)
         if self._row == height and self._column == 0 and self.samples < noise_meter.FROM <= after:
@@ -207,6 +220,32 @@ class Passes:
             self._row = 0
             self.samples += self._pass_samples
             self._pass_samples = 0
+        self._count_light()
+
+    @property
+    def _light_rows(self) -> int:
+        """The rows of the picture's paths of light in a pass."""
+        return self._dispatcher.settings.height if self._light.on else 0
+
+    def _count_light(self) -> None:
+        """Tell the sums of the paths of light how many they have."""
+        settings, first, samples = self._dispatcher.settings, self.samples, self._pass_samples
+        pixels, row = settings.width * settings.height, self._row - self.schedule.size[1]
+        part = 0
+        if self._light.on and samples and row >= 0:
+            part = pixels if row >= self._light_rows else self._light_tiles.pixels_before(row, self._column)
+        odd = (first + samples) // 2 - first // 2  # of the pass under way
+        self._light.odd = pixels * (first // 2) + part * odd
+        self._light.even = pixels * (first - first // 2) + part * (samples - odd)
+
+    def _trace_light(self, row: int) -> None:
+        tiles, samples = self._light_tiles, self._pass_samples
+        tile = tiles.tile(row, self._column, samples)
+        start = time.perf_counter()
+        self._light.trace(tile, self.samples, samples)
+        self._dispatcher.context.finish()
+        tiles.took(tile, samples, time.perf_counter() - start)
+        self._advance(tile, tiles.size[0])
 
     def _trace_picture(self) -> None:
         schedule = self.schedule
@@ -224,9 +263,9 @@ class Passes:
         uniforms["slot_first"] = d.bind_part(sums, part, d.settings.width)
         d.run(self._kernel, uniforms, groups)
 
-    def _trace_meter(self) -> None:
+    def _trace_meter(self, row: int) -> None:
         d, schedule = self._dispatcher, self.schedule
-        turn, row = divmod(self._row - schedule.size[1], self._meter.lines)
+        turn, row = divmod(row, self._meter.lines)
         first, samples = schedule.meter_samples(noise_meter.FROM, turn)
         tile = self._meter_tiles.tile(row, self._column, samples)
         start = time.perf_counter()

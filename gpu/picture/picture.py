@@ -17,6 +17,7 @@ from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture import blocks, display, first_hit
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.light_paths import LightPaths
 from gpu.picture.look import Look, Lut, ViewTable
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
@@ -45,8 +46,9 @@ class Picture:
         self._dispatcher = Dispatcher(context, uniform_buffer, scene, settings)
         self._meter = NoiseMeter(context, kernels, size, self._dispatcher.most_pixels)
         self._sums = Accumulators(self._dispatcher, kernels)
-        self._passes = Passes(self._dispatcher, kernels, self._sums, self._meter)
-        self._readout = Readout(self._dispatcher, kernels, self._sums, self._meter)
+        self._light = LightPaths(self._dispatcher, kernels)
+        self._passes = Passes(self._dispatcher, kernels, self._sums, self._meter, self._light)
+        self._readout = Readout(self._dispatcher, kernels, self._sums, self._meter, self._light)
         self.block = SharedBlock(self._dispatcher, self._sums, self._passes)
         try:
             self._sums.allocate()
@@ -79,7 +81,7 @@ class Picture:
     def _beside(self) -> list[Any]:
         """The buffers of its state, without the accumulators."""
         plan = self._passes.schedule.buffers
-        return [*self._meter.buffers.values(), self._dispatcher.counters, *plan]
+        return [*self._meter.buffers.values(), self._dispatcher.counters, *plan, *self._light.buffers]
 
     @property
     def state(self) -> list[Any]:
@@ -105,6 +107,11 @@ class Picture:
     def under_way(self) -> tuple[int, int, int]:
         """The pass under way: its samples (0: none), row and column of the next tile."""
         return self._passes.under_way
+
+    @property
+    def traces_caustics(self) -> bool:
+        """Whether its caustics are traced from the lights."""
+        return self._light.on
 
     @property
     def at_border(self) -> bool:
@@ -270,6 +277,7 @@ class Picture:
         """Release the device's memory."""
         contexts.use(self.context)
         self._sums.release()
+        self._light.release()
         for buffer in self._meter.buffers.values():
             buffer.release()
         self._readout.first_hit.release()

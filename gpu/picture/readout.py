@@ -17,6 +17,7 @@ from gpu.picture.accumulators import Accumulators
 from gpu.picture.coverage import Coverage
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
+from gpu.picture.light_paths import LightPaths
 from gpu.picture.look import Look
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.resolve import resolve
@@ -28,8 +29,11 @@ _PIECE = 1 << 16  # pixels, a megabyte of each accumulator
 class Readout:
     """Reads the picture's sums and the meter's, and traces first hits when they are first read."""
 
-    def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
+    def __init__(
+        self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter, light: LightPaths
+    ) -> None:
         self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
+        self._light = light
         self._size = dispatcher.settings.width, dispatcher.settings.height
         self.first_hit = FirstHit(dispatcher.context, self._size, dispatcher.most_pixels)
         self.coverage = Coverage(dispatcher.context, self._size, dispatcher.most_pixels)
@@ -44,6 +48,8 @@ class Readout:
         mean = np.empty((self._size[0] * self._size[1], 4), np.float32)
         for first, count in self._pieces():
             mean[first : first + count] = self._sums.means(first, count)
+            if self._light.on:
+                mean[first : first + count, :3] += self._light.radiance(first, count)
         return mean.reshape(self._size[1], self._size[0], 4)
 
     def variance(self) -> np.ndarray:
@@ -55,20 +61,27 @@ class Readout:
             n = np.maximum(moments[:, 3:], 1)
             spread = np.where(n > 1, moments[:, :3] / np.maximum(n - 1, 1) / n, 0)
             out[first : first + count] = np.minimum(spread.astype(np.float64) * scale**2, 3e38)
-        return out.reshape(self._size[1], self._size[0], 3)
+        shaped = out.reshape(self._size[1], self._size[0], 3)
+        return np.minimum(shaped + self._light.variance(), 3e38).astype(np.float32) if self._light.on else shaped
 
     def noise(self, samples: int) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
         if samples < 2:
             return None
         scale = float(self._dispatcher.scene.arrays.radiance_scale)
-        return self._meter.noise(self._sums, samples >= noise_meter.FROM, scale)
+        error, mean = self._meter.error(self._sums, samples >= noise_meter.FROM, scale)
+        if self._light.on:
+            light, squared = self._light.squared_error()
+            error, mean = float(np.sqrt(error**2 + squared.mean())), mean + float(light.mean())
+        return error / mean if mean else 0.0
 
     def display(self, look: Look, dtype: str, color: np.ndarray | None) -> np.ndarray:
         """Colour as `Picture.display` gives it."""
         d = self._dispatcher
         own: dict[Slot, Any] = {}
         bind = self._sums.bind
+        if color is None and self._light.on:
+            color = self.color()
         if color is not None:
             given = {Slot.SUM: color, Slot.MOMENTS: np.ones_like(color)}
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}

@@ -79,6 +79,11 @@ class Tiles:
         columns = max(int(min(pixels / self._band, width)) // _LEAST * _LEAST, self._least)
         return column, row, min(columns, self._most_columns, width - column), rows
 
+    def pixels_before(self, row: int, column: int) -> int:
+        """The pixels of all tiles before the one that begins there."""
+        width, height = self.size
+        return row * width + column * min(self._band, height - row)
+
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
         """Record a tile's cost: a rise counts at once, a fall little by little."""
         _, y, width, height = tile

@@ -32,8 +32,9 @@ vec4 environment_image(vec3 d) {
 }
 #endif
 
-// The radiance from the world direction w, and the density with which environment_light_sample gives it.
-vec4 environment_radiance(vec3 w) {
+// The radiance from the world direction w, with the sun's or without, and the density with which
+// environment_light_sample gives it.
+vec4 environment_radiance(vec3 w, bool sun) {
     vec3 d = environment_turn(w);
 #if HAS_ENVIRONMENT_IMAGE
     vec4 l = environment_image(d);
@@ -46,7 +47,7 @@ vec4 environment_radiance(vec3 w) {
 #endif
 #if HAS_SUN
     bool sunny = sun_holds(d);
-    if (sunny && d.y > 0.0) l.rgb += uniforms.environment_sun_radiance;
+    if (sun && sunny && d.y > 0.0) l.rgb += uniforms.environment_sun_radiance;
     l.a = mix(l.a, sunny ? 1.0 / (TWO_PI * uniforms.environment_sun_cap) : 0.0, uniforms.environment_sun_share);
 #endif
     return vec4(l.rgb * uniforms.environment_scale, l.a);
@@ -93,7 +94,7 @@ LightSample environment_light_sample(uvec2 bits) {
     if (sunny) d = to_sun;
 #endif
     vec3 wi = environment_turn_back(d);
-    vec4 l = environment_radiance(wi);
+    vec4 l = environment_radiance(wi, true);
     return LightSample(wi, INFINITY_T, l.rgb, l.a, true, NONE);
 }
 #endif

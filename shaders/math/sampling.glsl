@@ -75,4 +75,13 @@ float sampling_filter_axis(float u) {
     return u < 0.5 ? -r : r;
 }
 
+// How far the filter reaches, in pixels, and its density along one axis, which is tabulated at even steps up to there.
+float sampling_filter_radius() { return filter_table[FILTER_TABLE_SIZE].x; }
+
+float sampling_filter_density(float x) {
+    float s = abs(x) / sampling_filter_radius() * float(FILTER_TABLE_SIZE);
+    uint k = min(uint(s), uint(FILTER_TABLE_SIZE - 1));
+    return s <= float(FILTER_TABLE_SIZE) ? mix(filter_table[k].y, filter_table[k + 1u].y, s - float(k)) : 0.0;
+}
+
 vec2 sampling_filter(vec2 u) { return vec2(sampling_filter_axis(u.x), sampling_filter_axis(u.y)); }

@@ -47,7 +47,7 @@ float direct_weight(LightSample light, float found_pdf) {
 
 // The weight of emission that the path has found by chance.
 float direct_found_weight(Path path) {
-    float weight = path.counts ? 1.0 : 0.0;
+    float weight = path.counts && !caustics_leave_out(path) ? 1.0 : 0.0;
 #if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
     if (path.at.light != NONE && path.found_pdf < PDF_DELTA) {
         float light_pdf = lights_pdf(path.at.light, path.hit, path.at, path.lit, path.d);

@@ -29,17 +29,17 @@ bool found_light_background() {
 
 // Radiance from infinity along d, weighted against sampling it directly; `pdf` is the density of d. The camera does not
 // see the disks of directional lights: they count where the path was `scattered`.
-vec3 found_light_outside(vec3 d, float pdf, bool scattered) {
+vec3 found_light_outside(vec3 d, float pdf, bool scattered, bool sunless) {
     vec3 arriving = vec3(0.0);
 #if HAS_ENVIRONMENT
-    vec4 l = environment_radiance(d);
+    vec4 l = environment_radiance(d, !sunless);
     arriving = l.rgb;
 #if ESTIMATOR == ESTIMATOR_MIS
     arriving *= power_heuristic(pdf, l.a * uniforms.environment_probability);
 #endif
 #endif
 #if HAS_SUN_DISKS
-    if (scattered) arriving += found_light_disks(d, pdf);
+    if (scattered && !sunless) arriving += found_light_disks(d, pdf);
 #endif
     return arriving;
 }

@@ -43,6 +43,9 @@ float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
     single = single && !clear;
 #endif
     if (single) {
+#if REVERSED
+        d = -d; // the camera's rays would go the other way
+#endif
         hit = hit && dot(cross(tri.v1 - tri.v0, tri.v2 - tri.v0), d) < 0.0;
     }
 #endif

@@ -1,0 +1,140 @@
+"""Caustics that are traced from the lights: a light tracer in numpy, and the camera's paths where these find them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Picture, Renderer
+from tests.rendering import document, picture
+
+CENTER, RADIUS, INDEX, ALBEDO = np.array([0.0, 1.3, 0.0]), 1.0, 1.5, 0.5
+GLASS = {"type": "principled", "transmission": 1, "ior": INDEX, "roughness": 0, "base_color": [1, 1, 1]}
+# It looks under the ball, along its shadow.
+POSITION, TARGET, HEIGHT = np.array([-6.0, 2.5, 3.0]), np.array([1.2, 0.3, 0.0]), 5.0
+TOWARDS = np.array([1.0, -1.3, 0.2]) / np.linalg.norm([1.0, -1.3, 0.2])
+SUN: dict[str, Any] = {"type": "directional", "direction": TOWARDS.tolist(), "irradiance": 3}
+LAMPS: dict[str, dict[str, Any]] = {
+    "sun of .53 degrees": SUN | {"angular_diameter": 0.53},
+    "no extent": SUN,
+    "point": {"type": "point", "position": [-2.5, 4.5, -0.5], "intensity": 60},
+}
+
+
+def scene(light: dict[str, Any], ball: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    camera = {"type": "orthographic", "height": HEIGHT, "position": POSITION.tolist(), "target": TARGET.tolist()}
+    shapes = [
+        {"type": "sphere", "center": CENTER.tolist(), "radius": RADIUS, "material": "ball"},
+        {"type": "quad", "origin": [-8, 0, 8], "u": [16, 0, 0], "v": [0, 0, -16], "material": "floor"},
+    ]
+    materials = {"ball": ball or GLASS, "floor": {"type": "diffuse", "albedo": ALBEDO}}
+    return document(shapes, materials, **{"camera": camera, "lights": [light], **more})
+
+
+def caustic(made: Picture) -> np.ndarray:
+    """(h, w, 3): what the paths of light brought."""
+    settings = made.settings
+    values = made._light.radiance(0, settings.width * settings.height)
+    return values.reshape(settings.height, settings.width, 3).astype(float)
+
+
+def _rays(light: dict[str, Any], count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rays at the ball, from its light: origins, directions, and the flux of each."""
+    u, angle = rng.random(count), rng.random(count) * 2 * np.pi
+    if light["type"] == "point":
+        o = np.broadcast_to(np.array(light["position"], float), (count, 3))
+        axis = CENTER - o[0]
+        away = np.linalg.norm(axis)
+        cap = 1 - np.sqrt(1 - (RADIUS / away) ** 2)
+        x, y = _across(axis / away)
+        h = u * cap
+        r = np.sqrt(h * (2 - h))
+        d = (1 - h)[:, None] * axis / away + (r * np.cos(angle))[:, None] * x + (r * np.sin(angle))[:, None] * y
+        return o, d, np.full(count, light["intensity"] * 2 * np.pi * cap / count)
+    d = np.broadcast_to(TOWARDS, (count, 3))
+    half = np.radians(light.get("angular_diameter", 0.0)) / 2
+    if half > 0:
+        x, y = _across(TOWARDS)
+        s, turn = np.sin(half) * np.sqrt(rng.random(count)), rng.random(count) * 2 * np.pi
+        d = (s * np.cos(turn))[:, None] * x + (s * np.sin(turn))[:, None] * y + np.sqrt(1 - s**2)[:, None] * TOWARDS
+    first = np.cross(d, [0, 0, 1.0])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    second = np.cross(d, first)
+    r = RADIUS * np.sqrt(u)
+    o = CENTER - 10 * d + (r * np.cos(angle))[:, None] * first + (r * np.sin(angle))[:, None] * second
+    return o, d, np.full(count, light["irradiance"] * np.pi * RADIUS**2 / count)
+
+
+def _across(d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    x = np.cross(d, [1.0, 0, 0] if abs(d[0]) < 0.5 else [0, 1.0, 0])
+    x /= np.linalg.norm(x)
+    return x, np.cross(d, x)
+
+
+def _fresnel(cosine: np.ndarray, eta: float) -> np.ndarray:
+    sin2 = (1 - cosine**2) / eta**2
+    below = np.sqrt(np.maximum(0, 1 - sin2))
+    s, p = (cosine - eta * below) / (cosine + eta * below), (below - eta * cosine) / (below + eta * cosine)
+    return np.where(sin2 >= 1, 1.0, 0.5 * (s**2 + p**2))
+
+
+def _hit(o: np.ndarray, d: np.ndarray, far: bool) -> np.ndarray:
+    """The distance to the ball; inf where the ray misses it."""
+    f = o - CENTER
+    b = (f * d).sum(axis=1)
+    disc = b**2 - (f * f).sum(axis=1) + RADIUS**2
+    return np.where(disc > 0, -b + (1 if far else -1) * np.sqrt(np.maximum(disc, 0)), np.inf)
+
+
+def _floor(o: np.ndarray, d: np.ndarray, flux: np.ndarray) -> float:
+    """The sum of the pixels' radiance that rays bring which leave the ball, on the floor where the camera sees it."""
+    t = np.where(d[:, 1] < 0, -o[:, 1] / np.minimum(d[:, 1], -1e-12), 0.0)
+    p = o + t[:, None] * d
+    forward = (TARGET - POSITION) / np.linalg.norm(TARGET - POSITION)
+    right = np.cross(forward, [0, 1, 0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    seen = (d[:, 1] < 0) & (np.abs(p[:, [0, 2]]) < 8).all(axis=1)
+    seen &= (np.abs((p - POSITION) @ np.stack([right, up], axis=1)) < HEIGHT / 2).all(axis=1)
+    back = np.broadcast_to(-forward, p.shape)
+    seen &= ~((_hit(p, back, far=False) > 1e-6) & np.isfinite(_hit(p, back, far=False)))
+    return float((flux * seen).sum() * ALBEDO / np.pi * abs(forward[1]))
+
+
+def light_tracer(light: dict[str, Any], bounces: int, count: int = 400_000) -> float:
+    """The mean over the picture of the radiance of all light that comes to the floor by way of the ball, after at most
+    that many events, that on the floor included."""
+    rng = np.random.default_rng(1)
+    o, d, flux = _rays(light, count, rng)
+    t = _hit(o, d, far=False)
+    hits = np.isfinite(t)
+    o, d, flux = (o + t[:, None] * d)[hits], d[hits], flux[hits]
+    n = (o - CENTER) / RADIUS
+    c = -(d * n).sum(axis=1)
+    share = _fresnel(c, INDEX)
+    total = _floor(o, d + 2 * c[:, None] * n, flux * share) if bounces >= 2 else 0.0
+    below = np.sqrt(1 - (1 - c**2) / INDEX**2)
+    d = d / INDEX + (c / INDEX - below)[:, None] * n
+    flux = flux * (1 - share)
+    for _ in range(3, bounces + 1):
+        o = o + _hit(o, d, far=True)[:, None] * d
+        n = (CENTER - o) / RADIUS
+        c = -(d * n).sum(axis=1)
+        share = _fresnel(c, 1 / INDEX)
+        below = np.sqrt(np.maximum(0, 1 - (1 - c**2) * INDEX**2))
+        out = d * INDEX + (c * INDEX - below)[:, None] * n
+        total += _floor(o, out, flux * (1 - share))
+        d, flux = d + 2 * c[:, None] * n, flux * share
+    return total / HEIGHT**2
+
+
+@pytest.mark.parametrize("name", LAMPS)
+@pytest.mark.parametrize("bounces", [3, 8])
+def test_totals_are_those_of_a_light_tracer(gpu: Renderer, name: str, bounces: int) -> None:
+    """Within 2 %. With three bounces only light that is mirrored, or that goes straight through, comes to the floor."""
+    made = picture(gpu, scene(LAMPS[name]), 16, caustics="light", width=48, height=48, max_bounces=bounces)
+    expected = light_tracer(LAMPS[name], bounces)
+    assert expected > 0.01
+    assert caustic(made).mean() == pytest.approx(expected, rel=0.02)
