@@ -26,7 +26,8 @@ class RenderSettings:
     """The size is in pixels. `clamp` bounds the radiance of indirect light (None: unbiased). With `adaptive` a
     pixel's samples follow its noise (gpu/picture/sample_plan.py), and a picture's number of samples is their mean.
     `caustics` says whether they are traced from the lights or found by the camera's paths ("auto": see
-    `features.traces_caustics`)."""
+    `features.traces_caustics`). `filter_glossy` is the least roughness after a path's first scattering; 0
+    is unbiased."""
 
     width: int
     height: int
@@ -39,3 +40,4 @@ class RenderSettings:
     clamp: float | None = None
     adaptive: bool = False
     caustics: str = "paths"
+    filter_glossy: float = 0.0

@@ -44,6 +44,8 @@ class ResolvedSettings:
     resolution_scale: float
     adaptive: bool
     clamp: float | None
+    caustics: str | None
+    filter_glossy: float
     denoise: bool
 
     @property
@@ -56,8 +58,12 @@ class ResolvedSettings:
 
     def for_gpu(self) -> dict[str, Any]:
         """The keyword arguments of gpu.RenderSettings."""
-        same = ("max_bounces", "estimator", "sampler", "filter", "roulette_depth", "seed", "clamp", "adaptive")
-        sized = {"width": self.render_width, "height": self.render_height}
+        same = (
+            "max_bounces", "estimator", "sampler", "filter", "roulette_depth", "seed", "clamp", "adaptive",
+            "filter_glossy",
+        )  # fmt: skip
+        sized: dict[str, Any] = {"width": self.render_width, "height": self.render_height}
+        sized |= {"caustics": self.caustics or "auto"}
         return sized | {name: getattr(self, name) for name in same}
 
     def document(self) -> dict[str, Any]:

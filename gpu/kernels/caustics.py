@@ -59,6 +59,13 @@ def throws(scene: SceneArrays) -> bool:
     return bool(len(found) and ((areas[:, None] / np.maximum(away2, 1e-30)).sum(axis=0) / 4 < SMALL).any())
 
 
+def hides(scene: SceneArrays) -> bool:
+    """Whether there are caustics of lamps without extent, which the camera's paths cannot find."""
+    kinds, spread = scene.lights["kind"], scene.lights["spread"]
+    lamps = np.isin(kinds, _LAMPS) | ((kinds == LightKind.DIRECTIONAL) & (spread <= 0))
+    return bool(lamps.any() and throws_caustics(scene.materials).any())
+
+
 def _shining(scene: SceneArrays) -> np.ndarray:
     """The lights that paths of light leave: all but the environment, of which only a sun is traced so."""
     kinds = scene.lights["kind"]

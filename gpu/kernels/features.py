@@ -12,7 +12,7 @@ from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
 from gpu.kernels.flag_table import ANYWHERE, FLAGS, SHAPES, beside, looped_count
 from gpu.layout import ShapeKind
-from gpu.layout.models import TABULATED, TRANSMITTING
+from gpu.layout.models import DELTA, TABULATED, TRANSMITTING
 from gpu.layout.pixel_layers import SPLAT_BYTES
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
@@ -72,7 +72,7 @@ def evaluating(material: SceneArrays) -> frozenset[str]:
 
 def needs_tables(raised: Container[str]) -> bool:
     """Whether kernels with these flags look up the tables of what microfacets lose."""
-    return any(model.lobes_flag in raised for model in TABULATED)
+    return any(model.flag in raised for model in TABULATED)
 
 
 # Units, to a picture's scale of radiance, in which light is summed that comes to a pixel from elsewhere. 64 bits hold
@@ -84,8 +84,9 @@ MOST_SPLATTED = (1 << 27) // SPLAT_BYTES
 
 def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
     """Whether caustics are traced from the lights. With "auto" they are where that errs less at equal time; never
-    where samples follow what was found, and not in pictures that a kernel cannot bind as a whole."""
-    able = not settings.adaptive and settings.width * settings.height <= MOST_SPLATTED
+    where samples follow what was found, nor where surfaces become rough on the way, nor in pictures that a kernel
+    cannot bind as a whole."""
+    able = not settings.adaptive and settings.filter_glossy == 0 and settings.width * settings.height <= MOST_SPLATTED
     flag = {"light": "HAS_CAUSTICS", "auto": "HAS_SHARP_CAUSTICS"}.get(settings.caustics)
     return able and flag is not None and flag in raised
 
@@ -148,6 +149,9 @@ def defines(
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)
+    out["HAS_FILTER_GLOSSY"] = int(settings is not None and settings.filter_glossy > 0)
+    if out["HAS_FILTER_GLOSSY"]:  # what is perfectly specular by itself gets lobes
+        out |= {model.lobes_flag: 1 for model in DELTA if model.flag in raised}
     out["ADAPTIVE"] = int(settings is not None and settings.adaptive)
     out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
     out["CAUSTICS"] = int(settings is not None and traces_caustics(raised, settings))

@@ -327,6 +327,7 @@ class Uniforms(Record):
     looped_triangles: u32
     group_stride: u32  # places from one work group to the next; see gpu.picture.schedule.group_stride
     footprint_share: f32  # of a pixel's width: that of the footprint of one camera ray; see gpu.picture.filters
+    filter_glossy: f32  # least roughness after a path's first scattering
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 

@@ -73,6 +73,7 @@ class Dispatcher:
         )
         uniforms["footprint_share"] = filters.FOOTPRINT[s.filter]
         uniforms["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
+        uniforms["filter_glossy"] = s.filter_glossy
         uniforms["slot_width"] = s.width
         return uniforms
 

@@ -33,7 +33,8 @@ def density(name: str, size: int) -> np.ndarray:
     x = np.linspace(0, RADIUS[name], 1 << 17)
     w = profile(name, x)
     total = 2 * np.sum(0.5 * (w[1:] + w[:-1])) * (x[1] - x[0])
-    return (profile(name, np.linspace(0, RADIUS[name], size + 1)) / total).astype(np.float32)
+    out: np.ndarray = profile(name, np.linspace(0, RADIUS[name], size + 1)) / total
+    return out.astype(np.float32)
 
 
 @cache

@@ -15,7 +15,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu.kernels import caustics
 from gpu.kernels.cache import KernelCache
-from gpu.kernels.features import SPLAT_UNITS
+from gpu.kernels.features import MOST_SPLATTED, SPLAT_UNITS
 from gpu.layout import LUMINANCE
 from gpu.layout.bindings import Slot
 from gpu.layout.pixel_layers import SPLAT_BYTES
@@ -76,6 +76,22 @@ class LightPaths:
             self._sources, self._read = contexts.allocate(d.context, words), read
             self._begins = bool(words[0, 1])
         return compile_ms
+
+    @property
+    def warnings(self) -> list[str]:
+        """A warning where light of lamps without extent cannot be found."""
+        d = self._dispatcher
+        if not caustics.hides(d.scene.arrays):
+            return []
+        if self.on:
+            return []
+        if d.settings.adaptive or d.settings.filter_glossy > 0:
+            how = '; they need settings.caustics "light", which goes neither with adaptive nor with filter_glossy'
+        elif d.settings.width * d.settings.height > MOST_SPLATTED:
+            how = f"; they are traced from the lights in pictures of at most {MOST_SPLATTED} pixels"
+        else:
+            how = '; settings.caustics "light" finds them'
+        return [f"the caustics of lamps without extent are missing{how}"]
 
     def compile_fully(self) -> float:
         """Run the kernel over no pixel, for the reason of `Passes._compile_fully`. Returns the milliseconds."""

@@ -150,9 +150,9 @@ class Picture:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings about paths that were not followed to their end."""
+        """Warnings about paths that were not followed to their end, and about light that no path can find."""
         contexts.use(self.context)
-        return self._dispatcher.warnings
+        return [*self._dispatcher.warnings, *self._light.warnings]
 
     def save(self, room: Callable[[int], np.ndarray] = _bytes) -> Generator[None, None, Saved]:
         """Read the picture's state piece by piece, a step each; the picture must not be traced meanwhile.

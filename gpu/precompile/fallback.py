@@ -51,7 +51,7 @@ def defines(raised: frozenset[str] | None = None, arrays: SceneArrays | None = N
 def settings_for(settings: RenderSettings) -> RenderSettings | None:
     """The settings with which it renders the same picture; None where it cannot."""
     known = settings.estimator == "mis" and settings.sampler == "sobol"
-    return replace(settings, adaptive=False, caustics="paths") if known else None
+    return replace(settings, adaptive=False, caustics="paths", filter_glossy=0.0) if known else None
 
 
 def kernel_key(

@@ -233,11 +233,17 @@ class Loaded:
     raised: tuple[str, ...]  # features that the kernel was compiled with, and those that were left out
     spared: tuple[str, ...]
     warnings: list[str]
+    traces_caustics: bool = False  # from the lights
 
     @property
     def kernel(self) -> dict[str, Any]:
         """What a render's status says of its kernel."""
-        return {"raised": list(self.raised), "not_raised": list(self.spared), "compile_ms": self.compile_ms}
+        return {
+            "raised": list(self.raised),
+            "not_raised": list(self.spared),
+            "caustics": "light" if self.traces_caustics else "paths",
+            "compile_ms": self.compile_ms,
+        }
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import Path
 from pydantic import BaseModel, Field
@@ -124,6 +124,9 @@ class Schemas(BaseModel):
 class Kernel(BaseModel):
     raised: list[str] = Field(description="Features of the scene that the kernel was compiled with.")
     not_raised: list[str] = Field(description="Features that it was spared.")
+    caustics: Literal["light", "paths"] | None = Field(
+        None, description="Whether caustics are traced from the lights or found by the camera's paths."
+    )
     compile_ms: float
 
 

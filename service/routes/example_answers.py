@@ -44,6 +44,8 @@ STATUS: dict[str, Any] = {
         "resolution_scale": 1,
         "adaptive": False,
         "clamp": None,
+        "caustics": None,
+        "filter_glossy": 0.0,
         "denoise": False,
     },
 }

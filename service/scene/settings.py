@@ -140,6 +140,24 @@ class Settings(Model):
             soft=100,
         ),
     ] = None
+    caustics: Annotated[
+        Literal["light", "paths"] | None,
+        OMITTABLE,
+        hint(
+            "Caustics",
+            "Traced from the lights or found by the camera's paths; left out: what errs less in the scene.",
+        ),
+    ] = None
+    filter_glossy: Annotated[
+        float,
+        Field(ge=0, le=1),
+        hint(
+            "Filter glossy",
+            "Least roughness of surfaces after a path's first scattering: blurs caustics that are noise, and biases.",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
     denoise: Annotated[
         bool,
         hint("Denoise", "Filters noise out of the picture while there is much of it; what is shown is then biased."),
@@ -149,9 +167,22 @@ class Settings(Model):
 _SETTINGS = TypeAdapter(Settings)
 
 
+def _refuse_beside_light(settings: Settings, pointer: str) -> None:
+    """Raises InvalidDocument for settings that caustics which are traced from the lights do not go with."""
+    if settings.caustics != "light":
+        return
+    if settings.adaptive:
+        reason = 'adaptive sampling plans by the camera\'s paths alone; use caustics "paths" with it'
+        raise InvalidDocument([FieldError(f"{pointer}/caustics", reason)])
+    if settings.filter_glossy > 0:
+        reason = 'filter_glossy makes surfaces rough that light is traced through; use caustics "paths" with it'
+        raise InvalidDocument([FieldError(f"{pointer}/caustics", reason)])
+
+
 def parse_settings(document: Any, pointer: str = "", limits: Limits | None = None) -> Settings:
     """The settings that a document gives. Raises InvalidDocument with every mistake, seen from `pointer` up."""
     settings = validated(_SETTINGS, document, pointer)
+    _refuse_beside_light(settings, pointer)
     most = limits.max_pixels if limits else MAX_PIXELS
     if settings.width * settings.height > most:
         larger = "width" if settings.width >= settings.height else "height"

@@ -197,7 +197,8 @@ class TaskPicture:
         if update.may_not_fit:
             setup_s, full = time.monotonic() - began, residency.full
             kernel = full.compile_ms + updates.take_compile_ms(), full.scene.features, full.scene.spared
-            self._send(Loaded(self._number, self.tracker.generation, setup_s, *kernel, self.ending.warnings))
+            told = self._number, self.tracker.generation, setup_s, *kernel, self.ending.warnings
+            self._send(Loaded(*told, full.traces_caustics))
         if update.scene is not None or update.settings is not None:
             updates.foresee(settings)
 

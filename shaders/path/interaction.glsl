@@ -57,6 +57,7 @@ Interaction interaction_make(inout Path path, out Material m) {
 #else
     m = material_pick(path.at.material);
 #endif
+    filter_glossy_roughen(path, m);
     vec3 smooth_w = sides_normal(path.at, wo_w);
 #if HAS_HEIGHTS
     here.mapped = height_normal(path.at, path.at.ns); // that of the surface on which coat and base lie

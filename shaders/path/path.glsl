@@ -41,6 +41,7 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     path.cone = cone_begin(d);
     path.hues = hues_begin(rng, turn);
     caustics_begin(path);
+    filter_glossy_begin(path);
     return path;
 }
 

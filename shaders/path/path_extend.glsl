@@ -24,11 +24,15 @@ struct Path {
     Medium medium;
     Cone cone;
     Hues hues;
+#if HAS_FILTER_GLOSSY
+    bool spread; // an event was not perfectly specular
+#endif
 #if CAUSTICS
     bool caustic; // so far it is a caustic's: see path/caustics.glsl
 #endif
 };
 #include "path/caustics.glsl"
+#include "path/filter_glossy.glsl"
 
 // A throughput below this may end the path by chance. It is below 1 because the variance of ended paths costs more than
 // the time that they would take: with 1/2 the error after equal time is a sixth less in a white box, a third less with
@@ -88,6 +92,7 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     }
     uint pair = sobol_bounce_pair(path.bounce);
     caustics_note(next.is_delta, path);
+    filter_glossy_note(next.is_delta, path);
     path.bounce++;
     path_roulette(rng, pair, reach, path);
     path.eta_scale = sides_eta_scale(path.eta_scale, next.side, s, 0.0);

@@ -59,6 +59,8 @@ GLTF = {"type": "metal_rough", "base_color": 0.5, "metallic": 0.5, "roughness": 
 PHONG = {"type": "blinn_phong", "diffuse": 0.4, "specular": 0.4, "shininess": 20}
 GLASS = {"type": "principled", "transmission": 1, "roughness": 0.2}
 
+LAMP_OF_NO_EXTENT = {"type": "point", "position": [0, 3, 2], "intensity": 20}
+
 
 def many(shape: Doc) -> list[Doc]:
     return [{**shape, "transform": {"translate": [i - 15, 0, -i], "scale": [0.3, 0.2, 0.3]}} for i in range(30)]
@@ -140,6 +142,8 @@ SCENES: dict[str, Doc] = {
     "FILM": made_of({"type": "principled", "film_thickness": 300}),
     "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
+    "CAUSTICS": made_of({**GLASS, "roughness": 0}, lights=[LAMP_OF_NO_EXTENT]),
+    "SHARP_CAUSTICS": made_of({**GLASS, "roughness": 0}, lights=[LAMP_OF_NO_EXTENT]),
     "DISPERSION": made_of({**GLASS, "abbe": 30}),
     "THIN_WALLS": made_of({**GLASS, "thin_walled": True}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),

@@ -37,6 +37,8 @@ def test_defaults_are_balanced() -> None:
         "resolution_scale": 1.0,
         "adaptive": False,
         "clamp": None,
+        "caustics": None,
+        "filter_glossy": 0.0,
         "denoise": False,
     }
 

@@ -104,8 +104,8 @@ def _floor(o: np.ndarray, d: np.ndarray, flux: np.ndarray) -> float:
 
 
 def light_tracer(light: dict[str, Any], bounces: int, count: int = 400_000) -> float:
-    """The mean over the picture of the radiance of all light that comes to the floor by way of the ball, after at most
-    that many events, that on the floor included."""
+    """The mean over the picture of the radiance that the floor sends on of light which comes by way of the ball
+    after at most that many events, that on the floor included."""
     rng = np.random.default_rng(1)
     o, d, flux = _rays(light, count, rng)
     t = _hit(o, d, far=False)
@@ -133,7 +133,7 @@ def light_tracer(light: dict[str, Any], bounces: int, count: int = 400_000) -> f
 @pytest.mark.parametrize("name", LAMPS)
 @pytest.mark.parametrize("bounces", [3, 8])
 def test_totals_are_those_of_a_light_tracer(gpu: Renderer, name: str, bounces: int) -> None:
-    """Within 2 %. With three bounces only light that is mirrored, or that goes straight through, comes to the floor."""
+    """Within 2 %. With three bounces no light comes to the floor that was mirrored inside of the ball."""
     made = picture(gpu, scene(LAMPS[name]), 16, caustics="light", width=48, height=48, max_bounces=bounces)
     expected = light_tracer(LAMPS[name], bounces)
     assert expected > 0.01

@@ -918,5 +918,10 @@ class Settings(TypedDict, total=False):
     """More samples where there is more noise, fewer elsewhere; the samples count their mean. (default False)"""
     clamp: float
     """Bounds the radiance of indirect light: removes fireflies, and some light with them. (W/(m^2 sr), 0 to 1e+20)"""
+    caustics: Literal["light", "paths"]
+    """Traced from the lights or found by the camera's paths; left out: what errs less in the scene."""
+    filter_glossy: float
+    """Least roughness of surfaces after a path's first scattering: blurs caustics that are noise, and biases. (0 to
+    1, default 0.0)"""
     denoise: bool
     """Filters noise out of the picture while there is much of it; what is shown is then biased. (default False)"""
