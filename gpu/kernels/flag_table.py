@@ -76,6 +76,10 @@ def _tree(kind: ShapeKind) -> Asks:
     return lambda s: kind in s.bvh_kinds
 
 
+def _round(records: str) -> Asks:
+    return lambda s: bool((getattr(s, records)["shape"] & np.uint32(layout.ROUND)).any())
+
+
 def _light(kind: LightKind) -> Asks:
     return lambda s: bool((s.lights["kind"] == kind).any())
 
@@ -264,8 +268,9 @@ _ROWS = (
     Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
     Flag("HAS_VAST_SPHERES", lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any())),
     Flag("HAS_QUADS", _linear(ShapeKind.QUAD), previewed=lambda s: len(s.boxes) > 0),  # of one that shines
-    Flag("HAS_DISKS", lambda s: bool((s.quads["shape"] & np.uint32(layout.ROUND)).any())),
+    Flag("HAS_DISKS", _round("quads"), previewed=_round("boxes")),  # the caps of a cylinder that shines
     Flag("HAS_BOXES", _linear(ShapeKind.BOX)),
+    Flag("HAS_CYLINDERS", _round("boxes")),
     Flag("HAS_ELLIPSOIDS", _linear(ShapeKind.ELLIPSOID)),
     Flag("HAS_TRIANGLES", _linear(ShapeKind.TRIANGLE)),
     Flag("HAS_BVH", lambda s: bool(s.bvh_kinds)),
@@ -314,6 +319,7 @@ _ROWS = (
     Flag("HAS_QUAD_LIGHTS", _light(LightKind.QUAD), previewed=lambda s: len(s.quads) + len(s.boxes) > 0),
     Flag("HAS_TRIANGLE_LIGHTS", _light(LightKind.TRIANGLE), previewed=lambda s: len(s.triangles) > 0),
     Flag("HAS_ELLIPSOID_LIGHTS", _light(LightKind.ELLIPSOID), previewed=lambda s: len(s.ellipsoids) > 0),
+    Flag("HAS_CYLINDER_LIGHTS", _light(LightKind.CYLINDER), previewed=_round("boxes")),
     Flag("HAS_ENVIRONMENT", lambda s: s.environment is not None),
     Flag("HAS_ENVIRONMENT_IMAGE", lambda s: (e := s.environment) is not None and e.texels.size > 3 and not e.cube),
     Flag("HAS_ENVIRONMENT_CUBE", lambda s: s.environment is not None and s.environment.cube),

@@ -116,6 +116,7 @@ def constants() -> str:
         "SINGLE_SIDED",
         "HIDDEN",
         "ROUND",
+        "OPEN",
         "NORMALS_SMOOTH",
         "NORMALS_LEFT",
         "TANGENT_SHIFT",

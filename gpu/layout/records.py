@@ -21,7 +21,9 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear Rec.709
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises the flags it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: rays that come from behind pass the triangle
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
-ROUND = 0x20000000  # in Quad.shape: only the ellipse that touches its four edges is there, which is a disk
+ROUND = 0x20000000  # in Quad.shape: only the ellipse that touches its four edges is there, which is a disk; in the
+# shape of a box: only the cylinder about its y axis that touches its faces
+OPEN = 0x10000000  # in the shape of a cylinder: it has no caps
 # In TriangleNormals.bits: NORMALS_SMOOTH: the corners' normals are interpolated; NORMALS_LEFT: v grows to the right
 # of u, seen from outside. From TANGENT_SHIFT on follow three codes of TANGENT_BITS each: 0 for no tangent, else 1 +
 # its angle in the plane of the corner's normal, in steps. A step is 0.35 degrees, less than a normal map of 8 bits
@@ -56,6 +58,7 @@ class LightKind(IntEnum):
     QUAD = 5
     TRIANGLE = 6
     ELLIPSOID = 7
+    CYLINDER = 8  # the side of one, which is among the boxes
 
 
 class Material(Record):

@@ -49,7 +49,7 @@ from service.scene.procedural import NoiseTexture, RampInput, RampStop, RampText
 from service.scene.saved_material import SavedMaterial, check_saved_material
 from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
-from service.scene.shape import BoxShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
+from service.scene.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 from service.scene.text import load_json
 from service.scene.texture import (
     CheckerTexture,
@@ -72,6 +72,7 @@ __all__ = [
     "ColorTexture",
     "ConstantEnvironment",
     "CubemapEnvironment",
+    "CylinderShape",
     "DiffuseMaterial",
     "DirectionalLight",
     "DiskShape",

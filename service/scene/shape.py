@@ -1,4 +1,4 @@
-"""The shapes: sphere, quad, disk, box and mesh."""
+"""The shapes: sphere, quad, disk, cylinder, box and mesh."""
 
 from __future__ import annotations
 
@@ -69,6 +69,20 @@ class DiskShape(_Placed):
     radius: Annotated[
         PositiveLength, hint("Radius", "From the centre to the rim.", unit="m", widget="slider", soft=5)
     ]
+
+
+class CylinderShape(_Placed):
+    """A cylinder between two flat caps, or an open tube."""
+
+    type: Literal["cylinder"]
+    base: Annotated[Point, hint("Base", "The middle of the end where it begins.", unit="m", widget="number")]
+    axis: Annotated[
+        Direction, hint("Axis", "From the base to the other end, with its length.", unit="m", widget="number")
+    ]
+    radius: Annotated[PositiveLength, hint("Radius", "From the axis to the side.", unit="m", widget="slider", soft=5)]
+    caps: Annotated[
+        bool, hint("Caps", "Off: both ends are open, and the side is a sheet that is seen from within, too.")
+    ] = True
 
 
 class BoxShape(_Placed):
@@ -187,4 +201,6 @@ def _check_numbers(vertices: np.ndarray, faces: np.ndarray) -> None:
         raise refusal(f"{row} names a vertex that is not there: the last is {last}", at=f"/faces/{beyond}")
 
 
-Shape = Annotated[SphereShape | QuadShape | DiskShape | BoxShape | MeshShape, Field(discriminator="type")]
+Shape = Annotated[
+    SphereShape | QuadShape | DiskShape | CylinderShape | BoxShape | MeshShape, Field(discriminator="type")
+]

@@ -56,7 +56,7 @@ vec2 emitter_uv(uint id, vec3 q) {
     return uv;
 }
 
-// The distance from p to the near half of a ball whose far half is sampled; 0 for other shapes.
+// The distance from p to the near half of a ball or a cylinder whose far half is sampled; 0 for other shapes.
 float emitter_near(LightSample s, vec3 p) {
     uint index = s.id & LEAF_FIRST_MASK, kind = s.id >> LEAF_KIND_SHIFT;
     float near = 0.0;
@@ -70,11 +70,14 @@ float emitter_near(LightSample s, vec3 p) {
         near = 2.0 * dot(f, g) / dot(g, g) - s.t;
     }
 #endif
+#if HAS_CYLINDER_LIGHTS
+    if (kind == SHAPE_BOX) near = cylinder_near(box_pick(index), p, s.wi);
+#endif
     return near;
 }
 
-// The share of the light that arrives from the sampled place: the inside of a ball's far half is seen through the near
-// half, as far as that is transparent.
+// The share of the light that arrives from the sampled place: the inside of a far half is seen through the near half, as
+// far as that is transparent.
 float emitter_share(LightSample s, vec3 p, Hit hit, SurfacePoint at) {
     float share = 1.0;
 #if HAS_OPACITY && HAS_EMISSION_BOTH

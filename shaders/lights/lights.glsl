@@ -24,6 +24,7 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "lights/quad.glsl"
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"
+#include "lights/cylinder.glsl"
 #include "lights/light_tree.glsl"
 
 // Picks a light from the alias table of all.
@@ -61,6 +62,7 @@ LightSample lights_sample(LightContext context, uint pick_bits, uvec2 bits) {
     quad_light_sample_case(l, p, u, e, s);
     triangle_light_sample_case(l, p, u, e, s);
     ellipsoid_light_sample_case(l, p, u, e, s);
+    cylinder_light_sample_case(l, p, u, e, s);
     emitter_shine(l, e, p, s);
     s.pdf *= l.probability;
     return s;
@@ -78,5 +80,6 @@ float lights_pdf(uint light, Hit hit, SurfacePoint at, LightContext context, vec
     quad_light_pdf_case(hit, p, wi, e, pdf);
     triangle_light_pdf_case(hit, p, at, wi, e, pdf);
     ellipsoid_light_pdf_case(hit, at, wi, e, pdf);
+    cylinder_light_pdf_case(hit, p, at, wi, e, pdf);
     return pdf * l.probability;
 }

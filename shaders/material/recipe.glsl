@@ -7,7 +7,7 @@
 vec3 recipe_place(TextureSlot s, SurfacePoint at, vec2 uv) {
     vec3 p = vec3(uv, 0.0);
 #if HAS_SOLID_TEXTURES
-    ShapeSpace own = shape_space_load(at.shape & ~(SINGLE_SIDED | HIDDEN | ROUND));
+    ShapeSpace own = shape_space_load(at.shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN));
     vec3 q = vec3(dot(own.row_x, at.p), dot(own.row_y, at.p), dot(own.row_z, at.p))
            + vec3(own.move_x, own.move_y, own.move_z);
     if ((s.flags & TEXTURE_SLOT_SOLID) != 0u) p = q;

@@ -59,6 +59,8 @@ void shapes_plain(inout SurfacePoint r) {
 #include "shapes/disk.glsl"
 #include "shapes/quad.glsl"
 #include "shapes/solid.glsl"
+#include "shapes/cylinder.glsl"
+#include "shapes/box.glsl"
 #include "shapes/instance.glsl"
 #include "shapes/triangle.glsl"
 #include "shapes/traverse.glsl"

@@ -1,7 +1,8 @@
-// Affine images of the unit sphere (ellipsoid) and of the cube [-1, 1]^3 (box). Rays are intersected in the solid's own
-// space, where their direction is not of unit length, so that t is the same in both spaces.
+// Affine images of the unit sphere (ellipsoid), of the cube [-1, 1]^3 (box.glsl) and of the cylinder in it
+// (cylinder.glsl). Rays are intersected in the solid's own space, where their direction is not of unit length, so that t
+// is the same in both spaces.
 
-#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS || HAS_ELLIPSOID_LIGHTS
+#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS || HAS_ELLIPSOID_LIGHTS || HAS_CYLINDER_LIGHTS
 vec3 solid_rows(Solid s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_y, v), dot(s.row_z, v)); }
 
 // The columns of world_from_object, from the rows of its inverse.
@@ -26,7 +27,7 @@ SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
     r.ns = r.ng;
     r.material = s.material;
     r.light = s.light;
-    r.shape = s.shape;
+    r.shape = HAS_CYLINDERS != 0 ? s.shape & ~(ROUND | OPEN) : s.shape;
     r.flat_id = NONE;
     r.tangent = axes[0];
 #if HAS_TEXTURES || HAS_ANISOTROPIC
@@ -75,48 +76,6 @@ SurfacePoint ellipsoid_point(Solid s, vec3 p) {
     r.grow_u = solid_gradient(s, t) * (0.5 * INV_PI * by * by);
     r.grow_v = solid_gradient(s, cross(q, t)) * (INV_PI * by);
     r.bend = (length(s.row_x) + length(s.row_y) + length(s.row_z)) / 3.0; // that of a ball of about its size
-#endif
-    return r;
-}
-
-float box_hit(Solid s, vec3 o, vec3 d, float t_max) {
-    vec3 f = solid_rows(s, o - s.center), g = solid_rows(s, d);
-    vec3 inv = 1.0 / mix(g, vec3(1e-30), equal(g, vec3(0.0)));
-    vec3 ta = (-1.0 - f) * inv, tb = (1.0 - f) * inv;
-    vec3 lo = min(ta, tb), hi = max(ta, tb);
-    float near = max(lo.x, max(lo.y, lo.z)), far = min(hi.x, min(hi.y, hi.z));
-    float t = near > 0.0 ? near : far;
-    return near <= far && t > 0.0 && t < t_max ? t : t_max;
-}
-
-SurfacePoint box_point(Solid s, vec3 p) {
-    vec3 q = solid_rows(s, p - s.center);
-    vec3 a = abs(q);
-    float m = max(a.x, max(a.y, a.z));
-    vec3 n = a.x == m ? vec3(sign(q.x), 0.0, 0.0) : a.y == m ? vec3(0.0, sign(q.y), 0.0) : vec3(0.0, 0.0, sign(q.z));
-    // The point lies exactly on the face and keeps off its edges by its error: else a ray that leaves a corner inside
-    // could begin behind the other wall.
-    vec3 error = solid_error(s, solid_axes(s));
-    vec3 edge = vec3(dot(abs(s.row_x), error), dot(abs(s.row_y), error), dot(abs(s.row_z), error));
-    vec3 room = max(vec3(0.0), 1.0 - edge);
-    q = mix(clamp(q, -room, room), n, notEqual(n, vec3(0.0)));
-    SurfacePoint r = solid_point(s, q, n);
-#if HAS_ANISOTROPIC || HAS_TEXTURES
-    // u grows to the right as seen from outside: on faces of x along -z or +z, of y along +x, of z along +x or -x.
-    vec3 t = n.x != 0.0 ? vec3(0.0, 0.0, -n.x) : n.y != 0.0 ? vec3(1.0, 0.0, 0.0) : vec3(n.z, 0.0, 0.0);
-    r.tangent = solid_axes(s) * t;
-#endif
-#if HAS_TEXTURES
-    // v grows with +y; on the top along -z, on the bottom along +z.
-    vec3 b = n.y != 0.0 ? vec3(0.0, 0.0, -n.y) : vec3(0.0, 1.0, 0.0);
-    r.uv = clamp(0.5 + 0.5 * vec2(dot(q, t), dot(q, b)), 0.0, 1.0);
-#endif
-#if HAS_HEIGHTS
-    r.chart = solid_axes(s) * mat2x3(2.0 * t, 2.0 * b);
-#endif
-#if ANY_FOOTPRINTS
-    r.grow_u = 0.5 * solid_gradient(s, t);
-    r.grow_v = 0.5 * solid_gradient(s, b);
 #endif
     return r;
 }

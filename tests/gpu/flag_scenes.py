@@ -54,6 +54,7 @@ TRIANGLE = {"type": "mesh", "vertices": SMALL, "faces": [[0, 1, 2]], "smooth": F
 ODD = {"transform": {"scale": [1, 0.5, 0.7]}}
 BOX = {"type": "box", "min": [-1, -1, -1], "max": [1, 1, 1], "material": "m"}
 DISK = {"type": "disk", "center": [0, -1, 0], "normal": [0, 1, 0], "radius": 4, "material": "m"}
+CYLINDER = {"type": "cylinder", "base": [0, -1, 0], "axis": [0.3, 2, 0.5], "radius": 0.6, "material": "m"}
 SUN = {"type": "directional", "direction": [0, -1, 0], "irradiance": 1}
 GLTF = {"type": "metal_rough", "base_color": 0.5, "metallic": 0.5, "roughness": 0.5}
 PHONG = {"type": "blinn_phong", "diffuse": 0.4, "specular": 0.4, "shininess": 20}
@@ -90,7 +91,7 @@ SCENES: dict[str, Doc] = {
     "BVH": lit(MESH), "BVH_TRIANGLES": lit(MESH),
     "BVH_SPHERES": lit(*[ball("m", (i, 0, -i), 0.4) for i in range(30)]),
     "BVH_ELLIPSOIDS": lit(*many(ball("m"))), "BVH_BOXES": lit(*many(BOX)), "BVH_QUADS": lit(*many(FLOOR)),
-    "DISKS": lit(DISK),
+    "DISKS": lit(DISK), "CYLINDERS": lit(CYLINDER),
     "SINGLE_SIDED": lit({**TRIANGLE, "double_sided": False}), "SMOOTH_NORMALS": lit(icosphere("m", 1)),
     "HIDDEN_SHAPES": lit(FLOOR, ball("m", visible_to_camera=False)),
     "OPACITY": made_of({"type": "diffuse", "albedo": 0.5, "alpha": 0.5}), "TEXTURES": textured({"base_color": T}),
@@ -108,6 +109,7 @@ SCENES: dict[str, Doc] = {
     "EMISSION": made_of(LAMP), "EMISSION_BOTH": made_of({**LAMP, "emission_sides": "both"}),
     "SPHERE_LIGHTS": made_of(LAMP, ball("m")), "QUAD_LIGHTS": made_of(LAMP, FLOOR),
     "TRIANGLE_LIGHTS": made_of(LAMP, TRIANGLE), "ELLIPSOID_LIGHTS": made_of(LAMP, ball("m", **ODD)),
+    "CYLINDER_LIGHTS": made_of(LAMP, CYLINDER),
     "LIGHTS": lit(), "MANY_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),
     "LIGHT_TREE": lit(lights=[{"type": "point", "position": [i, 2, 0], "intensity": 4} for i in range(9)]),
     "POINT_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),

@@ -82,9 +82,11 @@ def test_the_superset_kernel_shows_the_same_picture(gpu: Renderer, name: str) ->
     same_picture(gpu.load(arrays), gpu.load_fallback(arrays, fallback.superset(arrays)), gpu=gpu)
 
 
-def test_the_superset_kernel_shows_what_sliders_make_of_the_scene(gpu: Renderer) -> None:
-    """A box that shines, which is six quads then, and glass that lets a third of all rays pass."""
-    before = SCENES["BOXES"]
+@pytest.mark.parametrize("name", ["BOXES", "CYLINDERS"])
+def test_the_superset_kernel_shows_what_sliders_make_of_the_scene(gpu: Renderer, name: str) -> None:
+    """A box that shines, which is six quads then, or a cylinder, which is a side and two disks, and glass that lets a
+    third of all rays pass."""
+    before = SCENES[name]
     glowing = {"type": "principled", "transmission": 1, "alpha": 0.67, "emission": 2}
     dull = arrays_of({**before, "materials": {"m": {"type": "principled"}}}, IMAGES)
     bright = arrays_of({**before, "materials": {"m": glowing}}, IMAGES)

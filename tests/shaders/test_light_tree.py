@@ -39,7 +39,7 @@ def _room(seed: int, count: int = 60, spread: float = 1.0, **more: Any) -> Doc:
         u, v = rng.normal(size=(2, 3)) * size
         name = LAMPS[rng.integers(len(LAMPS))]
         here = {"material": name, "transform": {"translate": at.tolist()}}
-        kind = i % 6
+        kind = i % 7
         if kind == 0:
             shapes.append({"type": "sphere", "center": at.tolist(), "radius": size, "material": name})
         elif kind == 1:
@@ -52,6 +52,14 @@ def _room(seed: int, count: int = 60, spread: float = 1.0, **more: Any) -> Doc:
             ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1}
             shapes.append({**ball, "material": name, "transform": {"translate": at.tolist(), **turn}})
         elif kind == 4:
+            tube = {
+                "type": "cylinder",
+                "base": [-0.2, 0, 0.1],
+                "axis": u.tolist(),
+                "radius": float(np.linalg.norm(v)),
+            }
+            shapes.append({**tube, "caps": False, **here})
+        elif kind == 5:
             standing.append({"type": "point", "position": at.tolist(), "intensity": 10 ** rng.uniform(-2, 2)})
         else:
             outer = float(rng.uniform(1, 90))
@@ -163,16 +171,17 @@ def _outline(arrays: SceneArrays, k: int) -> tuple[np.ndarray, np.ndarray | None
     light = arrays.lights[k]
     kind = LightKind(int(light["kind"]))
     rng = np.random.default_rng(k)
-    if kind in (LightKind.SPHERE, LightKind.ELLIPSOID):
-        q = rng.normal(size=(400, 3))
+    if kind in (LightKind.SPHERE, LightKind.ELLIPSOID, LightKind.CYLINDER):
+        q = rng.normal(size=(400, 3)) * [1, kind != LightKind.CYLINDER, 1]
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         if kind == LightKind.SPHERE:
             ball = arrays.spheres[light["index"]]
             return ball["center"] + float(ball["radius"]) * q, q
-        solid = arrays.ellipsoids[light["index"]]
+        solid = (arrays.ellipsoids if kind == LightKind.ELLIPSOID else arrays.boxes)[light["index"]]
         rows = np.stack([solid["row_x"], solid["row_y"], solid["row_z"]]).astype(float)
         out = q @ rows
-        return solid["center"] + q @ np.linalg.inv(rows).T, out / np.linalg.norm(out, axis=1, keepdims=True)
+        along = rng.uniform(-1, 1, (400, 1)) * [0, kind == LightKind.CYLINDER, 0]
+        return solid["center"] + (q + along) @ np.linalg.inv(rows).T, out / np.linalg.norm(out, axis=1, keepdims=True)
     a, b = rng.random((2, 400, 1))
     if kind == LightKind.QUAD:
         quad = arrays.quads[light["index"]]

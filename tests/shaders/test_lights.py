@@ -325,6 +325,9 @@ def _crowd() -> dict[str, Any]:
         {"type": "sphere", "center": [0, 0, 0], "radius": 0.3, "material": "bulb", "visible_to_camera": False,
          "transform": {"translate": [-1, 0.6, 0.8], "scale": [1, 0.5, 1.4]}},
         {"type": "box", "min": [0.4, -1, 0.9], "max": [0.8, -0.4, 1.3], "material": "veil"},
+        {"type": "cylinder", "base": [-2.2, -0.8, 1], "axis": [0.5, 1.4, -0.3], "radius": 0.2, "material": "bulb"},
+        {"type": "cylinder", "base": [1, 1.6, -1], "axis": [1, 0.2, 0.4], "radius": 0.15, "caps": False,
+         "material": "panel"},
         {**TURNED_MESH, "material": "panel", "transform": {"translate": [-0.5, -0.6, 0], "scale": 0.5}},
     ]  # fmt: skip
     materials = {

@@ -126,6 +126,15 @@ def test_marks_and_strengths(editor: Editor) -> None:
     assert slid["center"] != disk["center"] and slid["radius"] == disk["radius"] and "transform" not in slid
     assert np.array(slid["normal"]) @ way / np.linalg.norm(way) == pytest.approx(1, abs=1e-3), "and still does"
 
+    scene = add(editor, "Tube light")
+    (tube,) = [shape for shape in scene["shapes"] if shape["type"] == "cylinder"]
+    way = np.array([0, 1, 0]) - np.add(tube["base"], np.divide(tube["axis"], 2))
+    assert abs(np.array(tube["axis"]) @ way) < 1e-3 * np.linalg.norm(way), "it lies across the way to the ball"
+    page.locator("#markers .mark.chosen").focus()
+    page.keyboard.press("ArrowRight")
+    turned = document(editor)["shapes"][4]
+    assert turned["base"] != tube["base"] and turned["radius"] == tube["radius"] and "transform" not in turned
+
     scene = add(editor, "Point light")
     strength = page.get_by_role("slider", name="Intensity, strength")
     assert "stops" in str(strength.get_attribute("aria-valuetext"))

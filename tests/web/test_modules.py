@@ -229,6 +229,7 @@ def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
     [
         ({"type": "sphere", "center": [1, 2, 3], "radius": 1}, {"center": [2, 2, 1]}),
         ({"type": "disk", "center": [1, 2, 3], "normal": [0, 1, 0], "radius": 1}, {"center": [2, 2, 1]}),
+        ({"type": "cylinder", "base": [1, 2, 3], "axis": [0, 1, 0], "radius": 1}, {"base": [2, 2, 1]}),
         ({"type": "box", "min": [0, 0, 0], "max": [1, 1, 1]}, {"min": [1, 0, -2], "max": [2, 1, -1]}),
         ({"type": "quad", "origin": [0, 0, 0], "u": [1, 0, 0], "v": [0, 0, 1]}, {"origin": [1, 0, -2]}),
         ({"type": "mesh", "asset": "a"}, {"transform": {"translate": [1, 0, -2]}}),

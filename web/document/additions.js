@@ -42,9 +42,19 @@ export function additions(schema) {
       needs: shapes.disk,
       make: (c, r, material) => ({ type: "disk", center: near(c), normal: [0, 1, 0], radius: r, material }),
     },
+    {
+      title: "Cylinder",
+      kind: "shapes",
+      needs: shapes.cylinder,
+      make: (c, r, material) => {
+        const [x, y, z] = near(c);
+        return { type: "cylinder", base: [x, y - r, z], axis: [0, 2 * r, 0], radius: r, material };
+      },
+    },
     { title: "Ground", needs: shapes.quad, carries: true },
     { title: "Area light", kind: "shapes", needs: shapes.quad, shines: "quad" },
     { title: "Disk light", kind: "shapes", needs: shapes.disk, shines: "disk" },
+    { title: "Tube light", kind: "shapes", needs: shapes.cylinder, shines: "cylinder" },
     { title: "Sphere light", kind: "shapes", needs: shapes.sphere, shines: "sphere" },
     { title: "Point light", kind: "lights", needs: lights.point, shines: "point" },
     { title: "Spot light", kind: "lights", needs: lights.spot, shines: "spot" },

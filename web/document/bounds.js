@@ -77,28 +77,34 @@ export function see({ asset, transform }, cloud) {
 // What is flat by its kind: a floor, a wall, a panel.
 export const isFlat = ({ type }) => type === "quad" || type === "disk";
 
-const RIM = 32; // points on a disk's rim, whose box is half a per cent too small at most
+const RIM = 32; // points on a rim, whose box is half a per cent too small at most
 
-// The unit axes of a disk before its transform: two across its normal, and that.
-export function diskAxes({ normal }) {
-  const n = normalize(normal);
+// The unit axes of a disk or a cylinder before its transform: two across its normal or its axis, and that.
+export function roundAxes({ normal, axis }) {
+  const n = normalize(normal ?? axis);
   const right = Math.hypot(n[0], n[2]) > 1e-6 ? normalize([n[2], 0, -n[0]]) : [1, 0, 0];
   return [right, cross(n, right), n];
 }
 
-// Points on the rim of a disk before its transform.
-export function rimOf(disk) {
-  const { center, radius } = disk;
-  const [right, up] = diskAxes(disk);
+// Points on the rim of a disk, or of a cylinder's base, before its transform.
+function rimOf(shape) {
+  const { center, base, radius } = shape;
+  const [right, up] = roundAxes(shape);
   return Array.from({ length: RIM }, (_, i) => {
     const angle = (2 * Math.PI * i) / RIM;
     const way = add(scale(right, Math.cos(angle)), scale(up, Math.sin(angle)));
-    return add(center, scale(way, radius));
+    return add(center ?? base, scale(way, radius));
   });
 }
 
+// The rims of a disk or a cylinder before its transform.
+export function rimsOf(shape) {
+  const rim = rimOf(shape);
+  return shape.axis ? [rim, rim.map((point) => add(point, shape.axis))] : [rim];
+}
+
 function points(shape) {
-  if (shape.type === "disk") return rimOf(shape);
+  if (shape.type === "disk" || shape.type === "cylinder") return rimsOf(shape).flat();
   if (shape.type === "box") return corners(shape.min, shape.max);
   if (shape.type === "quad") {
     const { origin, u, v } = shape;

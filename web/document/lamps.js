@@ -1,6 +1,6 @@
 // Lights as a photographer places them: aimed at a subject, from a side where none is yet.
 
-import { isFlat, ownBox, place, rimOf } from "./bounds.js";
+import { isFlat, ownBox, place, rimsOf } from "./bounds.js";
 import { axes } from "./camera.js";
 import { isLamp } from "./emission.js";
 import { isLight, mapped, shifted } from "./manipulation.js";
@@ -88,7 +88,7 @@ export function standOf(scene, camera, { center, radius }) {
   return { position: rounded(add(center, scale(toLight, distance))), toLight, distance };
 }
 
-// A rectangle, a disk or a ball that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
+// A rectangle, a disk, a tube or a ball that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
 export function lampShape(type, { position, toLight }, { radius }, material) {
   const side = SIDE * radius;
   if (type === "sphere") {
@@ -99,6 +99,14 @@ export function lampShape(type, { position, toLight }, { radius }, material) {
     const own = Number((side / Math.sqrt(Math.PI)).toPrecision(3)); // as large as the rectangle
     const normal = rounded(scale(toLight, -1));
     return { shape: { type, center: position, normal, radius: own, material }, area: Math.PI * own * own };
+  }
+  if (type === "cylinder") {
+    // A tube that lies across the way to the subject: as long as two rectangles, and a sixteenth as thick.
+    const level = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
+    const radius = Number((side / 16).toPrecision(3));
+    const axis = rounded(scale(level, 2 * side));
+    const base = tidy(subtract(position, scale(axis, 0.5)));
+    return { shape: { type, base, axis, radius, material }, area: 2 * radius * length(axis) };
   }
   const flat = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
   const u = scale(flat, side);
@@ -185,7 +193,7 @@ export function outlineOf(document) {
   if (isLight(document)) return null;
   const own = ownBox(document);
   if (document.type === "sphere") return own && { center: middle(own), radius: (own.high[0] - own.low[0]) / 2 };
-  if (document.type === "disk") return rimOf(document).map((point) => place(point, document.transform));
+  if (document.type === "disk") return rimsOf(document)[0].map((point) => place(point, document.transform));
   if (document.type !== "quad") return null;
   const { origin, u, v, transform } = document;
   return [origin, add(origin, u), add(add(origin, u), v), add(origin, v)].map((point) => place(point, transform));

@@ -1,6 +1,6 @@
 // A thing of the scene moved, turned or scaled as a whole: a shape or a light, by a linear map about a pivot.
 
-import { diskAxes, place } from "./bounds.js";
+import { place, roundAxes } from "./bounds.js";
 import { moved, parts } from "./transforms.js";
 import { add, cross, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
 
@@ -65,6 +65,10 @@ export function mapped(thing, map, pivot) {
     const radius = Number((thing.radius * factor).toPrecision(7));
     return { ...thing, center: to(thing.center), normal: tidy(scale(map(thing.normal), 1 / factor)), radius };
   }
+  if (!thing.transform && thing.type === "cylinder" && similarity(map)) {
+    const radius = Number((thing.radius * similarity(map)).toPrecision(7));
+    return { ...thing, base: to(thing.base), axis: tidy(map(thing.axis)), radius };
+  }
   if (!thing.transform && isDiagonal(map)) {
     const factors = WORLD.map((axis, k) => map(axis)[k]);
     if (thing.type === "box") return { ...thing, min: to(thing.min), max: to(thing.max) };
@@ -83,7 +87,7 @@ export function ownAxes(thing) {
     const [u, v] = [thing.u, thing.v];
     axes = [u, v, [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]];
   }
-  if (thing.type === "disk" && !transform) axes = diskAxes(thing);
+  if ((thing.type === "disk" || thing.type === "cylinder") && !transform) axes = roundAxes(thing);
   const left = axes.map((axis) => scale(axis, 1 / length(axis)));
   return WORLD.map((_, k) => {
     const at = left.reduce((best, axis, i) => (Math.abs(axis[k]) > Math.abs(left[best][k]) ? i : best), 0);

@@ -61,6 +61,7 @@ export function moved(shape, offset) {
     const { translate = [0, 0, 0] } = shape.transform ?? {};
     return { ...shape, transform: { ...shape.transform, translate: by(translate) } };
   }
+  if (shape.base) return { ...shape, base: by(shape.base) };
   if (shape.center) return { ...shape, center: by(shape.center) };
   if (shape.type === "box") return { ...shape, min: by(shape.min), max: by(shape.max) };
   return { ...shape, origin: by(shape.origin) };

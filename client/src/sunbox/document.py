@@ -181,6 +181,28 @@ class CubemapEnvironment(TypedDict, total=False):
     """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
 
 
+class CylinderShape(TypedDict, total=False):
+    """A cylinder between two flat caps, or an open tube."""
+
+    type: Required[Literal["cylinder"]]
+    base: Required[list[float]]
+    """The middle of the end where it begins. (m)"""
+    axis: Required[list[float]]
+    """From the base to the other end, with its length. (m)"""
+    radius: Required[float]
+    """From the axis to the side. (m, 0 to 1e+09)"""
+    caps: bool
+    """Off: both ends are open, and the side is a sheet that is seen from within, too. (default True)"""
+    name: str
+    """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
 class DiffuseMaterial(TypedDict, total=False):
     """Scatters equally in all directions: f = albedo / pi."""
 
@@ -861,7 +883,7 @@ Material = (
 )
 
 
-Shape = SphereShape | QuadShape | DiskShape | BoxShape | MeshShape
+Shape = SphereShape | QuadShape | DiskShape | CylinderShape | BoxShape | MeshShape
 
 
 class Scene(TypedDict, total=False):

@@ -57,7 +57,7 @@ class Lights:
         prim = item.prim
         kinds = {
             UsdLux.DistantLight: self._distant, UsdLux.RectLight: self._rectangle, UsdLux.DiskLight: self._disk,
-            UsdLux.SphereLight: self._ball,
+            UsdLux.CylinderLight: self._tube, UsdLux.SphereLight: self._ball,
         }  # fmt: skip
         if prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1):
             self._dome(item)
@@ -104,6 +104,22 @@ class Lights:
         normal = _axis(world, 2, -1)
         shape = {"type": "disk", "center": world[:3, 3].tolist(), "normal": normal, "radius": radius * scale}
         self._lamp(item, shape, math.pi * (radius * scale) ** 2, brightness, world, 1.0)
+
+    def _tube(self, item: Item, world: Doubles, brightness: Doubles) -> None:
+        """Its side shines, and its ends are open."""
+        length, radius = self._number(item.prim, "length", 1.0), self._number(item.prim, "radius", 0.5)
+        if not (length > 0 and radius > 0):
+            self.notes.add(item.pointer, "a light without an area is left out")
+            return
+        scale = _scale(world, item, self.notes)
+        axis = world[:3, 0] * length
+        shape = {
+            "type": "cylinder", "base": (world[:3, 3] - axis / 2).tolist(), "axis": axis.tolist(),
+            "radius": radius * scale, "caps": False,
+        }  # fmt: skip
+        area = 2 * math.pi * radius * scale * float(np.linalg.norm(axis))
+        # Across its axis its intensity is 2 r l L, of an area of 2 pi r l.
+        self._lamp(item, shape, area, brightness, world, 1 / math.pi)
 
     def _ball(self, item: Item, world: Doubles, brightness: Doubles) -> None:
         prim = item.prim

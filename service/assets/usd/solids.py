@@ -1,5 +1,5 @@
-"""Spheres, boxes, cylinders, cones, capsules and planes. Spheres and boxes are shapes of the document; the others
-become triangles."""
+"""Spheres, boxes, cylinders, cones, capsules and planes. Cones and capsules become triangles; the others are shapes
+of the document."""
 
 from __future__ import annotations
 
@@ -54,18 +54,23 @@ def solid(prim: Usd.Prim, time: Usd.TimeCode) -> Solid | None:
         ball = {"type": "sphere", "center": [0.0, 0.0, 0.0], "radius": radius}
         return Solid(ball, *_turned(profile, "Z", ROUGHLY)[:2])
     half = height / 2
+    along = str(prim.GetAttribute("axis").Get(time) or "Z")
     if prim.IsA(UsdGeom.Cylinder):
         profile = [
             ((0, -half), (0, -1)), ((radius, -half), (0, -1)), ((radius, -half), (1, 0)), ((radius, half), (1, 0)),
             ((radius, half), (0, 1)), ((0, half), (0, 1)),
         ]  # fmt: skip
-    elif prim.IsA(UsdGeom.Cone):
+        up = [float(name == along) for name in AXES] if along in AXES else [0.0, 0.0, 1.0]
+        base, axis = ([way * x for x in up] for way in (-half, height))
+        pipe = {"type": "cylinder", "base": base, "axis": axis, "radius": radius}
+        return Solid(pipe, *_turned(profile, along, ROUGHLY)[:2])
+    if prim.IsA(UsdGeom.Cone):
         slope = height / math.hypot(radius, height), radius / math.hypot(radius, height)
         profile = [((0, -half), (0, -1)), ((radius, -half), (0, -1)), ((radius, -half), slope), ((0, half), slope)]
     else:
         low, high = _arc(radius, math.pi, math.pi / 2, ALONG // 4), _arc(radius, math.pi / 2, 0.0, ALONG // 4)
         profile = [((r, z - half), n) for (r, z), n in low] + [((r, z + half), n) for (r, z), n in high]
-    return Solid(None, *_turned(profile, str(prim.GetAttribute("axis").Get(time) or "Z"), AROUND))
+    return Solid(None, *_turned(profile, along, AROUND))
 
 
 Profile = list[tuple[tuple[float, float], tuple[float, float]]]  # (radius, z) and the normal there

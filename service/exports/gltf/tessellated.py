@@ -1,4 +1,4 @@
-"""Spheres, quads, disks and boxes as triangles, with the texture coordinates that the document gives them."""
+"""Analytic shapes as triangles, with the texture coordinates that the document gives them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.assets.types import Doubles, Indices
-from service.pack.geometry.analytic import CUBE_FACES, across
-from service.scene.shape import BoxShape, DiskShape, QuadShape, SphereShape
+from service.pack.geometry.analytic import CUBE_CAPS, CUBE_FACES, across
+from service.scene.shape import BoxShape, CylinderShape, DiskShape, QuadShape, SphereShape
 
 AROUND, UPWARD = 96, 48  # steps of a sphere: its outline is off by at most 0.0006 of the radius
-RIM = 96  # steps of a disk
+RIM = 96  # steps of a disk and a cylinder
 FACES = np.array(CUBE_FACES, float)
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -32,7 +32,7 @@ class Tessellated:
     kind: str
 
 
-def tessellated(shape: SphereShape | QuadShape | DiskShape | BoxShape) -> Tessellated:
+def tessellated(shape: SphereShape | QuadShape | DiskShape | CylinderShape | BoxShape) -> Tessellated:
     """The shape without its transform."""
     match shape:
         case SphereShape():
@@ -46,6 +46,8 @@ def tessellated(shape: SphereShape | QuadShape | DiskShape | BoxShape) -> Tessel
             return Tessellated(key, vertices, _whole(HALVES), CORNERS, None, np.eye(4), "quad")
         case DiskShape():
             return _disk(np.array(shape.center), np.array(shape.normal), shape.radius)
+        case CylinderShape():
+            return _cylinder(shape)
 
 
 def _sphere(center: Doubles, radius: float) -> Tessellated:
@@ -83,16 +85,48 @@ def _box(low: Doubles, high: Doubles) -> Tessellated:
 def _disk(center: Doubles, normal: Doubles, radius: float) -> Tessellated:
     """In the plane of `normal`, with the coordinates of the square around it."""
     right, up = across((normal[0], normal[1], normal[2]))
-    turn = 2 * math.pi * np.arange(RIM) / RIM
-    rim = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    flat = np.concatenate([[[0.0, 0.0]], rim])
-    k = np.arange(RIM)
-    faces = np.stack([0 * k, 1 + k, 1 + (k + 1) % RIM], axis=1)
+    flat, faces = _fan()
     vertices = np.column_stack([flat, np.zeros(len(flat))])
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, up, np.cross(right, up)], axis=1) * radius
     matrix[:3, 3] = center
     return Tessellated(("disk",), vertices, _whole(faces), (flat + 1) / 2, None, matrix, "disk")
+
+
+def _fan() -> tuple[Doubles, np.ndarray]:
+    """The unit disk: its middle, its rim, and the triangles between them."""
+    turn = 2 * math.pi * np.arange(RIM) / RIM
+    k = np.arange(RIM)
+    flat = np.concatenate([[[0.0, 0.0]], np.stack([np.cos(turn), np.sin(turn)], axis=1)])
+    return flat, np.stack([0 * k, 1 + k, 1 + (k + 1) % RIM], axis=1)
+
+
+def _cylinder(shape: CylinderShape) -> Tessellated:
+    """In the cube [-1, 1]^3, about its y axis: the side, with u as on a sphere, and the caps as of a box."""
+    u = np.arange(RIM + 1) / RIM
+    turn = 2 * math.pi * (u - 0.5)
+    ring = np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+    ring[-1] = ring[0]
+    up = np.array([0.0, 1.0, 0.0])
+    vertices = [ring - up, ring + up]
+    normals, uvs = [ring, ring], [np.stack([u, 0 * u + v], axis=1) for v in (0, 1)]
+    a = np.arange(RIM)
+    faces = [np.stack([a, a + 1, a + RIM + 2], axis=1), np.stack([a, a + RIM + 2, a + RIM + 1], axis=1)]
+    if shape.caps:
+        flat, fan = _fan()
+        for corner, along, upward in np.array(CUBE_CAPS, float):
+            faces.append(fan + sum(map(len, vertices)))
+            vertices.append(corner + (flat[:, :1] + 1) / 2 * along + (flat[:, 1:] + 1) / 2 * upward)
+            normals.append(np.tile(np.cross(along, upward) / 4, (len(flat), 1)))
+            uvs.append((flat + 1) / 2)
+    right, back = across(shape.axis)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([shape.radius * right, np.array(shape.axis) / 2, -shape.radius * back], axis=1)
+    matrix[:3, 3] = np.array(shape.base) + np.array(shape.axis) / 2
+    return Tessellated(
+        ("cylinder", shape.caps), np.concatenate(vertices), _whole(np.concatenate(faces)), np.concatenate(uvs),
+        np.concatenate(normals), matrix, "cylinder",
+    )  # fmt: skip
 
 
 def _whole(faces: np.ndarray) -> Indices:

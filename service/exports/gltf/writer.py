@@ -20,6 +20,7 @@ from service.scene.texture import references
 
 HOW = {
     "sphere": "the sphere is written as {count} triangles",
+    "cylinder": "the cylinder is written as {count} triangles",
     "disk": "the disk is written as {count} triangles",
     "box": "the box is written as {count} triangles",
     "quad": "the quad is written as {count} triangles",
@@ -93,7 +94,7 @@ class _Writer:
             part, matrix = self.meshes.of_solid(solid, i), matrix @ solid.matrix
             double = True
             self.losses.add(pointer, HOW[solid.kind].format(count=len(solid.faces)))
-            if single and solid.kind in ("quad", "disk"):
+            if single and (solid.kind in ("quad", "disk") or getattr(shape, "caps", True) is False):
                 self.losses.add(pointer, "it shines from its front alone, so glTF leaves out its back")
         double = double and not single
         for field in sorted(shape.model_fields_set & _LEFT_OUT.keys()):
@@ -119,6 +120,6 @@ class _Writer:
 
 _LEFT_OUT = {"visible_to_camera": "glTF cannot hide a shape from the camera alone; it is seen"}
 _WRITTEN = {
-    "type", "name", "material", "transform", "center", "radius", "normal", "origin", "u", "v", "min", "max", "asset",
-    "vertices", "faces", "normals", "uvs", "colors", "smooth", "double_sided",
+    "type", "name", "material", "transform", "center", "radius", "normal", "origin", "u", "v", "min", "max", "base",
+    "axis", "caps", "asset", "vertices", "faces", "normals", "uvs", "colors", "smooth", "double_sided",
 }  # fmt: skip

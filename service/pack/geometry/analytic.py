@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gpu import layout
 from service.problems import FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
 
@@ -28,20 +29,23 @@ CUBE_FACES = (
     ((-1, 1, 1), (2, 0, 0), (0, 0, -2)),
     ((-1, -1, -1), (2, 0, 0), (0, 0, 2)),
 )
+CUBE_CAPS = CUBE_FACES[4:]  # those at the ends of its y axis
 
 
 @dataclass
 class Solids:
-    """Affine images of the unit sphere or of the cube [-1, 1]^3."""
+    """Affine images of the unit sphere, of the cube [-1, 1]^3 or of the cylinder in it."""
 
     centers: list[Vec3] = field(default_factory=list)
     axes: list[np.ndarray] = field(default_factory=list)  # (3, 3) world from object
     used: list[tuple[int, int]] = field(default_factory=list)  # material, shape
+    bits: list[int] = field(default_factory=list)  # of a cylinder: layout.ROUND, and OPEN where it has no caps
 
-    def add(self, center: np.ndarray, axes: np.ndarray, used: tuple[int, int]) -> None:
+    def add(self, center: np.ndarray, axes: np.ndarray, used: tuple[int, int], bits: int = 0) -> None:
         self.centers.append(tuple(center))
         self.axes.append(axes)
         self.used.append(used)
+        self.bits.append(bits)
 
 
 @dataclass
@@ -99,19 +103,34 @@ class AnalyticShapes:
 
     def box(self, low: Vec3, high: Vec3, matrix: np.ndarray | None, used: tuple[int, int], emissive: bool) -> None:
         """Add a box; one that shines becomes six quads, as lights are sampled face by face."""
-        center = np.add(low, high) / 2
-        axes = np.diag(np.subtract(high, low) / 2)
-        if matrix is not None:
-            center, axes = matrix[:3, :3] @ center + matrix[:3, 3], matrix[:3, :3] @ axes
+        placed = _cube(np.add(low, high) / 2, np.diag(np.subtract(high, low) / 2), matrix)
+        center, axes = placed[:3, 3], placed[:3, :3]
         if not self._fits(used, center, *np.linalg.norm(axes, axis=0)):
             return
         if not emissive:
             self.boxes.add(center, axes, used)
             return
-        placed = np.eye(4)
-        placed[:3, :3], placed[:3, 3] = axes, center
         for origin, u, v in CUBE_FACES:
             self.quad(origin, u, v, placed, used)
+
+    def cylinder(
+        self, ends: tuple[Vec3, Vec3], radius: float, caps: bool, matrix: np.ndarray | None, used: tuple[int, int],
+        emissive: bool,
+    ) -> None:  # fmt: skip
+        """Add a cylinder, whose `ends` are the middle of its base and the way from there to its top; one that shines
+        becomes its side and two disks, as lights are sampled face by face."""
+        base, along = ends
+        right, up = across(along)
+        axes = np.stack([radius * right, np.array(along) / 2, -radius * up], axis=1)
+        placed = _cube(np.add(base, np.array(along) / 2), axes, matrix)
+        center, axes = placed[:3, 3], placed[:3, :3]
+        if not self._fits(used, center, *np.linalg.norm(axes, axis=0)):
+            return
+        is_open = emissive or not caps
+        self.boxes.add(center, axes, used, layout.ROUND | (layout.OPEN if is_open else 0))
+        if emissive and caps:
+            for origin, u, v in CUBE_CAPS:
+                self.quad(origin, u, v, placed, used, is_round=True)
 
     def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
         """Whether the shape is large enough for float32; records one that is not. Raises InvalidDocument where its
@@ -121,6 +140,13 @@ class AnalyticShapes:
             self.vanished.append(used[1])
             return False
         return True
+
+
+def _cube(center: np.ndarray, axes: np.ndarray, matrix: np.ndarray | None) -> np.ndarray:
+    """(4, 4): the map of the cube [-1, 1]^3 to one with this middle and these half edges, and on by `matrix`."""
+    placed = np.eye(4)
+    placed[:3, :3], placed[:3, 3] = axes, center
+    return placed if matrix is None else np.asarray(matrix @ placed)
 
 
 def across(normal: Vec3) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
     hidden = np.array([not shape.visible_to_camera for shape in shapes], bool)
     if hidden.any():
         for array in records:
-            index = array["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.ROUND) & layout.NONE)
+            index = array["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.ROUND | layout.OPEN) & layout.NONE)
             array["shape"] |= np.where(hidden[index], layout.HIDDEN, 0).astype(np.uint32)
 
 

@@ -8,7 +8,7 @@ from gpu.layout import ShapeSpace
 from service.scene import Scene
 from service.scene.numbers import Vec3
 from service.scene.procedural import NoiseTexture, RampInput, RampTexture
-from service.scene.shape import BoxShape, DiskShape, QuadShape, Shape, SphereShape
+from service.scene.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
 from service.scene.texture import references
 
 
@@ -47,6 +47,9 @@ def _middle(shape: Shape) -> Vec3:
     match shape:
         case SphereShape() | DiskShape():
             return shape.center
+        case CylinderShape():
+            x, y, z = (a + b / 2 for a, b in zip(shape.base, shape.axis, strict=True))
+            return x, y, z
         case BoxShape():
             x, y, z = ((a + b) / 2 for a, b in zip(shape.min, shape.max, strict=True))
             return x, y, z

@@ -21,7 +21,7 @@ from service.pack.textures.heights import HeightField
 from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
-from service.scene.shape import BoxShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
+from service.scene.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,9 @@ def place_analytic(shapes: Sequence[Shape], materials: ShapeMaterials) -> Analyt
                 placed.quad(shape.origin, shape.u, shape.v, matrix, used)
             case DiskShape():
                 placed.disk(shape.center, shape.normal, shape.radius, matrix, used)
+            case CylinderShape():
+                ends, emissive = (shape.base, shape.axis), shape.material in materials.emissive
+                placed.cylinder(ends, shape.radius, shape.caps, matrix, used, emissive)
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in materials.emissive)
     return placed

@@ -51,6 +51,8 @@ def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np
     out.set_box(mine, center - radius[:, None], center + radius[:, None], radius)
     mine, solids = of(LightKind.ELLIPSOID, ShapeKind.ELLIPSOID)
     _ellipsoids(out, mine, solids)
+    mine, pipes = of(LightKind.CYLINDER, ShapeKind.BOX)
+    _cylinders(out, mine, pipes, sides)
     mine, quads = of(LightKind.QUAD, ShapeKind.QUAD)
     o, u, v = (quads[name].astype(np.float64) for name in ("origin", "u", "v"))
     _flats(out, mine, np.stack([o, o + u, o + u + v, o + v], axis=1), quads["normal"], sides)
@@ -76,12 +78,27 @@ def _flats(out: LightBounds, mine: np.ndarray, corners: np.ndarray, across: np.n
 
 
 def _ellipsoids(out: LightBounds, mine: np.ndarray, solids: np.ndarray) -> None:
-    rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64)
-    axes = np.linalg.inv(rows) if len(rows) else rows  # columns: half axes
+    axes = _half_axes(solids)
     half = np.linalg.norm(axes, axis=2)
     center = solids["center"].astype(np.float64)
-    longest = np.linalg.svd(axes, compute_uv=False)[:, 0] if len(rows) else np.zeros(0)
+    longest = np.linalg.svd(axes, compute_uv=False)[:, 0] if len(axes) else np.zeros(0)
     out.set_box(mine, center - half, center + half, longest)
+
+
+def _cylinders(out: LightBounds, mine: np.ndarray, solids: np.ndarray, sides: np.ndarray) -> None:
+    axes = _half_axes(solids)
+    half = np.abs(axes[:, :, 1]) + np.hypot(axes[:, :, 0], axes[:, :, 2])
+    center = solids["center"].astype(np.float64)
+    widest = np.linalg.svd(axes[:, :, ::2], compute_uv=False)[:, 0] if len(axes) else np.zeros(0)
+    out.set_box(mine, center - half, center + half, np.linalg.norm(axes[:, :, 1], axis=1) + widest)
+    # Of a side of length l and radius r: the power 2 pi r l pi L over the intensity across it, 2 r l L
+    out.solid_angle[mine] = np.pi**2 * sides[mine]
+
+
+def _half_axes(solids: np.ndarray) -> np.ndarray:
+    """(n, 3, 3): the half axes of solids, as columns."""
+    rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64)
+    return np.linalg.inv(rows) if len(rows) else rows
 
 
 def _spots(out: LightBounds, mine: np.ndarray, spots: np.ndarray) -> None:

@@ -17,7 +17,8 @@ SHINING = {
     ShapeKind.QUAD: LightKind.QUAD,
     ShapeKind.ELLIPSOID: LightKind.ELLIPSOID,
     ShapeKind.TRIANGLE: LightKind.TRIANGLE,
-}  # a box that shines was packed as quads
+    ShapeKind.BOX: LightKind.CYLINDER,  # a box that shines was packed as quads, so that this is a cylinder's side
+}
 
 # Power says little about what reaches a point: a far strong light must not starve a near weak one.
 EVEN = 0.05  # share of the picks that is spread evenly over all lights
@@ -27,6 +28,7 @@ FAR_SHARE = (0.2, 0.8)
 # The least share of a spot's cone that its fading rim takes, so that its inverse fits into float32 with some digits
 # left.
 LEAST_RIM = 1e-6
+AROUND = 512  # places at which the outline of a cylinder is measured
 # Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
 LEAST_DISK = 1e-6
 
@@ -60,6 +62,7 @@ def areas(shapes: dict[ShapeKind, np.ndarray], lights: np.ndarray) -> np.ndarray
         LightKind.QUAD: (ShapeKind.QUAD, lambda quads: quads["area"]),
         LightKind.ELLIPSOID: (ShapeKind.ELLIPSOID, _ellipsoid_area),
         LightKind.TRIANGLE: (ShapeKind.TRIANGLE, _triangle_area),
+        LightKind.CYLINDER: (ShapeKind.BOX, _cylinder_area),
     }
     area = np.zeros(len(lights))
     for light_kind, (shape_kind, measure) in measures.items():
@@ -71,8 +74,8 @@ def areas(shapes: dict[ShapeKind, np.ndarray], lights: np.ndarray) -> np.ndarray
 def sides(lights: np.ndarray, materials: np.ndarray) -> np.ndarray:
     """(n,): the number of sides of each light of `mark` that send light to other shapes; the inside of a closed shape
     does not count."""
-    open_ = (lights["kind"] == LightKind.QUAD) | (lights["kind"] == LightKind.TRIANGLE)
-    return np.where(open_, materials["emission_sides"][lights["material"]], 1)
+    is_open = np.isin(lights["kind"], (LightKind.QUAD, LightKind.TRIANGLE, LightKind.CYLINDER))
+    return np.where(is_open, materials["emission_sides"][lights["material"]], 1)
 
 
 def _sphere_area(spheres: np.ndarray) -> np.ndarray:
@@ -90,6 +93,17 @@ def _ellipsoid_area(solids: np.ndarray) -> np.ndarray:
     a, b, c = (1.0 / np.linalg.svd(rows, compute_uv=False)).T if len(rows) else np.zeros((3, 0))
     p = 1.6075
     return np.asarray(4 * np.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3) ** (1 / p))
+
+
+def _cylinder_area(solids: np.ndarray) -> np.ndarray:
+    """The area of the sides: the length of the ellipse whose half axes are those of the cross-section, each across
+    the cylinder's axis and times its length. The mean over evenly spaced angles is exact but for long ellipses."""
+    if not len(solids):
+        return np.zeros(0)
+    axes = np.linalg.inv(np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64))
+    across, along = np.cross(axes[:, :, 1], axes[:, :, 0]), np.cross(axes[:, :, 1], axes[:, :, 2])
+    turn = np.arange(AROUND)[:, None, None] * (2 * np.pi / AROUND)
+    return np.asarray(4 * np.pi * np.linalg.norm(np.cos(turn) * along - np.sin(turn) * across, axis=2).mean(axis=0))
 
 
 def analytic_lights(lights: Sequence[Light], origin: Sequence[float], radius: float) -> tuple[np.ndarray, np.ndarray]:

@@ -211,7 +211,7 @@ def test_instances_share_their_meshes(store: AssetStore) -> None:
     )  # half floats
 
 
-def test_bodies_are_spheres_and_boxes_or_triangles_of_the_right_size(store: AssetStore) -> None:
+def test_bodies_are_analytic_shapes_or_triangles_of_the_right_size(store: AssetStore) -> None:
     text = """
     def Sphere "S" { double radius = 3 }
     def Cube "C" { double size = 4 }
@@ -236,13 +236,14 @@ def test_bodies_are_spheres_and_boxes_or_triangles_of_the_right_size(store: Asse
     assert named["C"]["min"] == [-2] * 3 and named["C"]["max"] == [2] * 3
     assert np.cross(named["F"]["u"], named["F"]["v"]).tolist() == [0, 12, 0] and "Hair" not in named
     assert found.document["materials"][named["K"]["material"]]["base_color"] == [0.25, 0.5, 0.75]
+    tube = {"type": "cylinder", "base": [-5, 0, 0], "axis": [10, 0, 0], "radius": 2}
+    assert {name: named["T"][name] for name in tube} == tube
     # By the divergence theorem: a closed mesh that faces outwards has this volume.
-    closed = {"T": math.pi * 4 * 10, "K": math.pi * 4 * 6 / 3, "P": math.pi * (2 + 4 / 3)}
+    closed = {"K": math.pi * 4 * 6 / 3, "P": math.pi * (2 + 4 / 3)}
     for name, volume in closed.items():
         solid = store.mesh(named[name]["asset"])
         a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
         assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=3e-3), name
-    assert np.ptp(store.mesh(named["T"]["asset"]).vertices, axis=0).tolist() == pytest.approx([10, 4, 4], rel=1e-3)
 
 
 def test_the_camera(store: AssetStore) -> None:
@@ -285,7 +286,8 @@ def test_lights_have_the_brightness_that_usdlux_says(store: AssetStore) -> None:
     text += light("RectLight", "Panel", rect + "\ncolor3f inputs:color = (1, 0.5, 0)")
     text += light("DiskLight", "Disk", "float inputs:radius = 30\nfloat inputs:intensity = 4")
     text += light("SphereLight", "Ball", "float inputs:radius = 30\nfloat inputs:intensity = 4")
-    text += light("CylinderLight", "Tube", "")
+    text += light("CylinderLight", "Tube", f"float inputs:length = 80\nfloat inputs:radius = 5{normalized}")
+    text += light("PortalLight", "Portal", "")
     found = imported(store, usda(text, "metersPerUnit = 0.01"))
     named = {each["name"]: each for each in found.document["lights"]}
     assert named["Sun"]["irradiance"] == [3, 3, 3] and named["Sun"]["direction"] == pytest.approx([0, 0, -1])
@@ -297,12 +299,17 @@ def test_lights_have_the_brightness_that_usdlux_says(store: AssetStore) -> None:
     placed = shapes(found)
     materials = found.document["materials"]
     radiance = {name: materials[shape["material"]]["emission"] for name, shape in placed.items() if name != "Floor"}
+    side = 2 * math.pi * 5 * 80
+    assert radiance.pop("Tube") == pytest.approx([1 / side] * 3)
     assert radiance == {"Panel": [8, 4, 0], "Disk": [4, 4, 4], "Ball": [4, 4, 4]}  # normalised by 20 x 50 units
+    tube = placed["Tube"]
+    assert tube["axis"] == pytest.approx([0.8, 0, 0]) and tube["base"] == pytest.approx([-0.4, 0, 0])
+    assert tube["radius"] == pytest.approx(0.05) and tube["caps"] is False
     panel = placed["Panel"]
     assert np.cross(panel["u"], panel["v"]) == pytest.approx([0, 0, -0.1]) and not panel["visible_to_camera"]
     assert np.add(panel["origin"], np.add(panel["u"], panel["v"]) / 2) == pytest.approx([0, 0, 0])
     assert placed["Disk"]["radius"] == pytest.approx(0.3) and placed["Disk"]["normal"] == [0, 0, -1]
-    assert [w["pointer"] for w in found.warnings if "CylinderLight" in w["detail"]] == ["/Tube"]
+    assert [w["pointer"] for w in found.warnings if "PortalLight" in w["detail"]] == ["/Portal"]
     assert found.lit
 
 

@@ -251,26 +251,6 @@ def test_quad_keeps_its_front_and_its_coordinates(transform):
     assert record["v_length"] * np.linalg.norm(record["u"]) == pytest.approx(record["area"], rel=1e-6)
 
 
-@pytest.mark.parametrize("transform", [None, {"scale": [1, 2, 3], "rotate": [9, 8, 7]}, MIRRORED])
-@pytest.mark.parametrize(
-    ("normal", "right"), [([0, 3, 0], [1, 0, 0]), ([0, 0, -2], [-1, 0, 0]), ([5, 5, 0], [0, 0, -1])]
-)
-def test_disk_is_the_round_in_a_square_that_stands_upright(transform, normal, right):
-    placed = {} if transform is None else {"transform": transform}
-    disk = {"type": "disk", "center": [1, 2, 3], "normal": normal, "radius": 0.5, "material": "grey", **placed}
-    arrays = packed(quad(), disk, {**disk, "visible_to_camera": False}).arrays
-    _, record, _hidden = arrays.quads
-    assert arrays.quads["shape"].tolist() == [0, layout.ROUND | 1, layout.ROUND | layout.HIDDEN | 2]
-    matrix = np.eye(4) if transform is None else matrix_of(transform)
-    outward = np.linalg.inv(matrix[:3, :3]).T @ normal
-    np.testing.assert_allclose(record["normal"], outward / np.linalg.norm(outward), atol=1e-6)
-    np.testing.assert_allclose(record["u"], matrix[:3, :3] @ right, atol=1e-6)
-    middle = record["origin"] + (record["u"] + record["v"]) / 2
-    np.testing.assert_allclose(middle, (matrix @ [1, 2, 3, 1])[:3], rtol=1e-5)
-    across = np.linalg.norm(np.cross(record["u"].astype(float), record["v"]))
-    assert record["area"] == pytest.approx(np.pi / 4 * across, rel=1e-5)
-
-
 def test_shapes_know_the_document_and_single_sided_ones_say_so():
     triangles = packed(mesh(), mesh(double_sided=False)).arrays.triangles
     assert sorted(triangles["shape"]) == 12 * [0] + 12 * [1 | layout.SINGLE_SIDED]

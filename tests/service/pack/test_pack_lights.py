@@ -11,8 +11,8 @@ import pytest
 from gpu import layout
 from gpu.kernels.features import counts, flags
 from gpu.layout import LightKind, ShapeKind
-from service.pack.lights import light_bounds
-from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
+from service.pack.lights import light_bounds, lights
+from tests.documents import GREY, LAMP, Shelf, box, matrix_of, mesh, packed, picture, quad, sphere
 
 MANY = {
     ShapeKind.SPHERE: ("spheres", 8, lambda i: sphere(center=[3 * i, 0, 0])),
@@ -96,14 +96,36 @@ KINDS = {
     LightKind.QUAD: "quads",
     LightKind.ELLIPSOID: "ellipsoids",
     LightKind.TRIANGLE: "triangles",
+    LightKind.CYLINDER: "boxes",
 }
 SHINING = [
     sphere(material="lamp"),
     *[quad(origin=[3 * i, 0, 0], material=("lamp", "grey")[i % 2]) for i in range(30)],
     sphere(material="lamp", transform={"scale": [1, 2, 1]}),
     *[mesh(transform={"translate": [0, 0, 3 * i]}, material=("grey", "lamp")[i % 2]) for i in range(4)],
+    {"type": "cylinder", "base": [0, 1, 0], "axis": [0, 1, 0], "radius": 1, "caps": False, "material": "lamp"},
+    box(material="grey"),
     sphere(),
 ]
+
+
+@pytest.mark.parametrize("transform", [{}, {"scale": [1, 3, 0.2], "rotate": [20, 30, 40]}])
+def test_the_area_of_a_cylinders_side(transform):
+    """Against that of a prism of many faces."""
+    pipe = {"type": "cylinder", "base": [1, 2, 3], "axis": [1, -2, 2], "radius": 0.4, "material": "lamp"}
+    arrays = packed({**pipe, "transform": transform}).arrays
+    sides = arrays.lights[arrays.lights["kind"] == LightKind.CYLINDER]
+    (area,) = lights.areas({ShapeKind.BOX: arrays.boxes, ShapeKind.QUAD: arrays.quads,
+                            ShapeKind.SPHERE: arrays.spheres, ShapeKind.ELLIPSOID: arrays.ellipsoids,
+                            ShapeKind.TRIANGLE: arrays.triangles}, sides)  # fmt: skip
+    across = np.linalg.svd(np.array([[1.0, -2, 2]]))[2][1:]
+    turn = np.linspace(0, 2 * np.pi, 20_001)
+    rim = 0.4 * np.stack([np.cos(turn), np.sin(turn)], 1) @ across
+    matrix = matrix_of(transform)[:3, :3]
+    faces = np.cross(np.diff(rim, axis=0) @ matrix.T, matrix @ [1, -2, 2])
+    assert area == pytest.approx(np.linalg.norm(faces, axis=1).sum(), rel=1e-4)
+    if not transform:
+        assert area == pytest.approx(2 * np.pi * 0.4 * 3, rel=1e-5)
 
 
 def test_lights_and_shapes_name_each_other():
@@ -115,6 +137,7 @@ def test_lights_and_shapes_name_each_other():
     assert counts == {
         LightKind.SPHERE: 1, LightKind.QUAD: 15, LightKind.ELLIPSOID: 1, LightKind.TRIANGLE: 24,
         LightKind.POINT: 1, LightKind.ENVIRONMENT: 1, LightKind.SPOT: 0, LightKind.DIRECTIONAL: 0,
+        LightKind.CYLINDER: 1,
     }  # fmt: skip
     for i, light in enumerate(arrays.lights):
         if name := KINDS.get(LightKind(int(light["kind"]))):
