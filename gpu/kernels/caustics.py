@@ -19,7 +19,7 @@ _EVEN = 0.1  # the share of the paths that all lights get alike: what their powe
 _ROOM = 1.0001  # of a ball, over what is inside: a rounding shall put none of that outside
 _FAR = 1e4  # radii of all targets together, from which light from infinity comes at most
 _GRID = 65535.0  # steps of a tree's grid
-_OF_SHAPES = (LightKind.SPHERE, LightKind.QUAD, LightKind.TRIANGLE, LightKind.ELLIPSOID)
+_OF_SHAPES = (LightKind.SPHERE, LightKind.QUAD, LightKind.TRIANGLE, LightKind.ELLIPSOID, LightKind.CYLINDER)
 _LAMPS = (LightKind.POINT, LightKind.SPOT)
 
 
@@ -145,6 +145,11 @@ def _extents(scene: SceneArrays, lights: np.ndarray) -> tuple[np.ndarray, np.nda
         centers[mine] = some["center"]
         radii2 = some["radius"].astype(float) ** 2 if kind == LightKind.SPHERE else _half_axes2(some).mean(axis=1)
         areas[mine] = 4 * np.pi * radii2
+    mine = lights["kind"] == LightKind.CYLINDER
+    pipes = scene.boxes[lights["index"][mine]]
+    lengths = np.linalg.norm(_axes(pipes), axis=1)
+    centers[mine] = pipes["center"]
+    areas[mine] = 4 * np.pi * lengths[:, 1] * np.sqrt((lengths[:, 0] ** 2 + lengths[:, 2] ** 2) / 2)
     mine = lights["kind"] == LightKind.QUAD
     quads = scene.quads[lights["index"][mine]]
     centers[mine], areas[mine] = quads["origin"] + 0.5 * (quads["u"] + quads["v"]), quads["area"]

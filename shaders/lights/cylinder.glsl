@@ -74,6 +74,11 @@ float cylinder_light_pdf(Solid s, vec3 p, SurfacePoint at, vec3 wi, uint sides, 
     return cylinder_light_density(s, axes, cylinder_light_view(s, p, axes, sides, transparency), wi, at.ng, sides);
 }
 
+// The density per area of places that are drawn uniformly by turn and height; n is their normal in the cylinder's space.
+float cylinder_light_area_density(Solid s, vec3 n) {
+    return 1.0 / (4.0 * PI * abs(determinant(solid_axes(s))) * length(solid_gradient(s, n)));
+}
+
 LightSample cylinder_light_sample(Solid s, vec3 p, vec2 u, uint sides, float transparency) {
     mat3 axes = solid_axes(s);
     CylinderView w = cylinder_light_view(s, p, axes, sides, transparency);

@@ -201,6 +201,15 @@ void emission_place(Light l, vec2 u, out vec3 q, out vec2 uv, out uint id, out f
         pdf_area = ellipsoid_light_density(s, n);
     }
 #endif
+#if HAS_CYLINDER_LIGHTS
+    if (l.kind == LIGHT_CYLINDER) {
+        Solid s = box_pick(l.index);
+        vec3 n = vec3(cos(TWO_PI * u.x), 0.0, sin(TWO_PI * u.x));
+        q = solid_point(s, vec3(n.x, 2.0 * u.y - 1.0, n.z), n).p;
+        id = (SHAPE_BOX << LEAF_KIND_SHIFT) | l.index;
+        pdf_area = cylinder_light_area_density(s, n);
+    }
+#endif
 }
 #endif
 

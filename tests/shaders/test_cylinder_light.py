@@ -194,3 +194,30 @@ def test_a_closed_cylinder_holds_its_light(gpu: Renderer, estimator: str, transf
     camera = {"position": [0.2, 0.1, 0.3], "target": [1, 1, 0], "vfov": 90}
     image = render(gpu, document([shape], {"glow": glow}, camera=camera), 128, max_bounces=4, estimator=estimator)
     np.testing.assert_allclose(image[..., :3].mean((0, 1)), COLOR * (1 - 0.6**5) / 0.4, rtol=0.01)
+
+
+@pytest.mark.parametrize("caps", [False, True])
+def test_a_mirror_shows_a_second_tube(gpu: Renderer, caps: bool) -> None:
+    """The light that a mirror brings where the tube itself is hidden: that of its image behind the mirror, and the
+    same whether it is traced from the camera or from the light."""
+    shape = {**LYING, "caps": caps}
+    mirror = {"type": "principled", "metallic": 1, "base_color": 1, "roughness": 0}
+    materials = {"m": GREY, "lamp": LAMP, "mirror": mirror, "black": {"type": "diffuse", "albedo": 0}}
+    shapes = [
+        FLOOR, shape,
+        {"type": "quad", "origin": [1.5, -0.8, 0], "u": [0, 1.6, 0], "v": [0, 0, 0.8], "material": "mirror"},
+        {"type": "quad", "origin": [-0.6, -0.6, 0.3], "u": [1.1, 0, 0], "v": [0, 1.2, 0], "material": "black"},
+    ]  # fmt: skip
+    spot = document(shapes, materials, camera=ASKEW)
+    if not caps:
+        image = render(gpu, spot, 4096, width=16, height=16, max_bounces=2, caustics="paths")[..., :3].mean((0, 1))
+        x, y, z = shape["base"]
+        there = {**shape, "base": [3 - x, y, z], "axis": [-shape["axis"][0], *shape["axis"][1:]]}
+        expected = 0.8 / math.pi * _irradiance(there, np.array([0, 0, 1.0])) * COLOR
+        np.testing.assert_allclose(image, expected, rtol=0.04)
+    wide = document(shapes, materials, camera={**ASKEW, "position": [-0.3, -0.4, 0.2], "vfov": 40})
+    by = {
+        way: render(gpu, wide, samples, width=16, height=16, max_bounces=2, caustics=way)[..., :3].mean((0, 1))
+        for way, samples in (("light", 1024), ("paths", 1024))
+    }
+    np.testing.assert_allclose(by["light"], by["paths"], rtol=0.03)
