@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpu import layout
-from gpu.layout.models import COATED, DELTA, TRANSMITTING, of
+from gpu.layout.models import COATED, DELTA, TRANSMITTING, of, with_optional
 
 _MATCHED = 1e-4  # an index closer to 1 neither bends nor mirrors
 _WEAK = 3e-8  # `specular` that leads to such an index
@@ -45,4 +45,24 @@ def throws_caustics(materials: np.ndarray) -> np.ndarray:
     m = materials
     smooth = (m["roughness"] < layout.LEAST_ROUGHNESS) & (m["roughness"] != np.float32(layout.TEXTURED))
     out: np.ndarray = of(m, DELTA) & smooth & ((m["metallic"] > 0.5) | (transmits(m) & (m["transmission"] > 0.5)))
+    return out
+
+
+def goes_straight(materials: np.ndarray) -> np.ndarray:
+    """Materials through whose surfaces light may go straight; shaders/material/material.glsl says why these."""
+    m = materials
+    matched = (m["specular"] <= 0) | (np.abs(m["ior"] - 1) < _MATCHED)
+    thin = m["thin_walled"] > 0
+    names = ("roughness", "ior", "specular", "coat_ior", "clearcoat", "clearcoat_roughness")
+    given = np.all([m[name] != np.float32(layout.TEXTURED) for name in names], axis=0)
+    smooth = matched | (m["roughness"] < layout.LEAST_ROUGHNESS)
+    dark = ~(m["emission"] > 0).any(axis=1)
+    out: np.ndarray = transmits(m) & given & (thin | (matched & (m["dispersion"] <= 0))) & smooth & dark
+    return out
+
+
+def filmed(materials: np.ndarray) -> np.ndarray:
+    """Materials under a thin film."""
+    m = materials
+    out: np.ndarray = of(m, with_optional("film_thickness")) & (m["film_thickness"] > 0) & (m["film_weight"] > 0)
     return out

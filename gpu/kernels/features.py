@@ -144,6 +144,8 @@ def defines(
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
+    out["ANY_VEILS"] = int(not raised.isdisjoint(("HAS_OPACITY", "HAS_STRAIGHT")))
+    out["SHADOW_MEDIA"] = int(raised.issuperset(("HAS_STRAIGHT", "HAS_ATTENUATION")))
     out |= {"QUAD_LAMP": -1} | textures_glsl.defines(None) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE

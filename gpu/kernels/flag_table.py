@@ -14,7 +14,7 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import caustics, textures_glsl
-from gpu.kernels.deltas import mirrors, transmits
+from gpu.kernels.deltas import filmed, goes_straight, mirrors, transmits
 from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
 from gpu.layout.models import BY_NUMBER, COATED, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
@@ -132,16 +132,14 @@ def _thin_walls(s: SceneArrays) -> bool:
     return bool((transmits(s.materials) & (s.materials["thin_walled"] > 0)).any())
 
 
+def _goes_straight(s: SceneArrays) -> bool:
+    """Whether there are lights, and surfaces that rays to them pass."""
+    return len(s.lights) > 0 and bool(goes_straight(s.materials).any())
+
+
 def _disperses(s: SceneArrays) -> bool:
     parts = (s.materials["dispersion"] > 0) & ~(s.materials["thin_walled"] > 0)
     return bool((transmits(s.materials) & parts).any())
-
-
-def _filmed(materials: np.ndarray) -> np.ndarray:
-    """Materials under a thin film."""
-    m = materials
-    out: np.ndarray = of(m, with_optional("film_thickness")) & (m["film_thickness"] > 0) & (m["film_weight"] > 0)
-    return out
 
 
 def _spreads(s: SceneArrays, model: Model) -> bool:
@@ -355,7 +353,7 @@ _ROWS = (
     ),
     Flag(
         "HAS_FILM",
-        lambda s: bool(_filmed(s.materials).any()),
+        lambda s: bool(filmed(s.materials).any()),
         evaluated_with=_flags_of(with_optional("film_thickness")),
         in_general=False,
     ),
@@ -383,6 +381,8 @@ _ROWS = (
         previewed=_any_of(TRANSMITTING),
         in_general=False,
     ),
+    # Rays to lights pass panes and boundaries of index 1.
+    Flag("HAS_STRAIGHT", _goes_straight, previewed=_any_of(TRANSMITTING), in_general=False),
     Flag("HAS_DISPERSION", _disperses, previewed=_any_of(TRANSMITTING), in_general=False),
     # They raise no code: `features.defines` asks for caustics where a setting does not forbid them.
     Flag("HAS_CAUSTICS", caustics.may_throw, previewed=_always, of_settings=True),

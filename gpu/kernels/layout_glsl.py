@@ -135,7 +135,7 @@ def constants() -> str:
         "PLAN_CLASSES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
-    out.append(f"const float LEAST_ROUGHNESS = {layout.LEAST_ROUGHNESS!r};")
+    out += [f"const float {name} = {getattr(layout, name)!r};" for name in ("LEAST_ROUGHNESS", "TEXTURED")]
     out.append(f"const vec3 LUMINANCE = vec3({', '.join(map(repr, layout.LUMINANCE))});")
     out.append(f"#define LIGHT_TREE_TEXTURE {bindings.LIGHT_TREE_TEXTURE}")
     out.append(f"const uint LIGHT_TREE_ROW = {bindings.TEXELS_A_ROW}u;")

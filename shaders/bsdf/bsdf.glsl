@@ -24,6 +24,7 @@ struct BsdfSample {
     Scatter scatter;
     float side;    // its sign says on which side of the surface d is
     bool is_delta; // a perfectly specular lobe gave it
+    bool straight; // that of a surface that light goes straight through
     bool valid;    // false: the path ends
 };
 

@@ -21,6 +21,21 @@ bool material_transmits(Material m) {
 #endif
 }
 
+// Whether light may go straight through its surfaces (path/straight.glsl decides at each point): they are walls or have
+// the index 1. Not where a texture gives what decides on that, as a path reads it over its footprint and a ray to a light
+// at a point, nor where the surface shines, as a light's sample is the nearest place of a lamp.
+bool material_goes_straight(Material m) {
+#if HAS_STRAIGHT
+    bool matched = m.specular <= 0.0 || abs(m.ior - 1.0) < 1e-4, thin = material_is_thin(m);
+    bool given = all(notEqual(vec4(m.roughness, m.ior, m.specular, m.coat_ior), vec4(TEXTURED)))
+              && all(notEqual(vec2(m.clearcoat, m.clearcoat_roughness), vec2(TEXTURED)));
+    return material_transmits(m) && given && (thin || (matched && m.dispersion <= 0.0))
+        && (matched || m.roughness < LEAST_ROUGHNESS) && max_component(m.emission) <= 0.0;
+#else
+    return false;
+#endif
+}
+
 // Whether it only mirrors or refracts.
 bool material_is_delta(Material m) {
     bool whole = m.metallic >= 1.0;

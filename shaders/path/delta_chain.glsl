@@ -21,6 +21,7 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
     next.scatter = lobe.scatter;
     next.side = lobe.wi.z;
     next.is_delta = true;
+    next.straight = lobe.wi.z < 0.0 && straight_goes(s, path.at);
     next.valid = next.scatter.pdf > 0.0 && terminator_agrees(path.at, next.d, lobe.wi.z, dot(next.d, here.front));
     path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
     path_extend(next, 1.0, s, rng, path);

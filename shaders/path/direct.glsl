@@ -50,25 +50,23 @@ float direct_found_weight(Path path) {
     float weight = path.counts && !caustics_leave_out(path) ? 1.0 : 0.0;
 #if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
     if (path.at.light != NONE && path.found_pdf < PDF_DELTA) {
-        float light_pdf = lights_pdf(path.at.light, path.hit, path.at, path.lit, path.d);
+        Hit hit = path.hit;
+        hit.t += path.travelled; // from the surface where lights were sampled
+        float light_pdf = lights_pdf(path.at.light, hit, path.at, path.lit, path.d);
         weight = power_heuristic(path.found_pdf, light_pdf);
     }
 #endif
     return weight;
 }
 
-// Whether the light is visible; surfaces on the way that let a share of it through take the rest from c.
-bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
-    uvec2 skip = uvec2(terminator_skip(at, light.wi), light.id);
+// Whether the light is visible; c loses what is lost on the way through `medium` and what surfaces there take. The ray
+// goes straight through as many of them as a path may that goes there, as each is a bounce of that path.
+bool direct_arrives(Path path, LightSample light, Medium medium, inout vec3 c) {
+    uvec2 skip = uvec2(terminator_skip(path.at, light.wi), light.id);
     vec3 o, d;
     float t;
-    terminator_aim(at, light, o, d, t);
-#if HAS_OPACITY
-    c *= transparency_share(o, d, t, skip);
-    return budget_lasts();
-#else
-    return !shapes_occluded(o, d, t, skip) && budget_lasts();
-#endif
+    terminator_aim(path.at, light, o, d, t);
+    return shadow_arrives(o, d, t, skip, medium, uniforms.max_bounces - 1u - path.bounce, c);
 }
 
 // Adds the light of one sample of one light.
@@ -85,8 +83,8 @@ void direct_add(Surface s, Interaction here, Material m, LightContext context, f
     if (counts) {
         vec3 c = path.throughput * (f.f * light.radiance * (weight / light.pdf));
         c *= sides_eta_scale(path.eta_scale, side, s, light.t);
-        c *= medium_share(interaction_medium(across < 0.0, path.medium, here.beyond), light.t);
-        if (direct_arrives(path.at, light, c)) path.radiance += path_clamp(c, path.bounce > 0u) * share;
+        Medium medium = interaction_medium(across < 0.0, path.medium, here.beyond);
+        if (direct_arrives(path, light, medium, c)) path.radiance += path_clamp(c, path.bounce > path.passed) * share;
     }
 }
 

@@ -15,11 +15,11 @@ void filter_glossy_note(bool is_delta, inout Path path) {
 }
 
 // Roughens the material that the path has come to. Measured reflection stays as it is; so do microfacets, whose parameter
-// means something else in each distribution.
+// means something else in each distribution. So do surfaces that light goes straight through: it is sampled there.
 void filter_glossy_roughen(Path path, inout Material m) {
 #if HAS_FILTER_GLOSSY
     float least = uniforms.filter_glossy;
-    if (path.spread) {
+    if (path.spread && !material_goes_straight(material_pick(path.at.material))) {
         m.roughness = max(m.roughness, least);
         if (m.clearcoat_roughness >= 0.0) m.clearcoat_roughness = max(m.clearcoat_roughness, least);
         // The exponent of a lobe as wide as alpha = roughness^2 [Walter et al. 2007, section 5.1].

@@ -102,7 +102,8 @@ void light_path_trace(Medium camera_medium, Sampler rng, bool odd) {
             Material m;
             Interaction here = interaction_make(path, m);
             bool whole = material_is_delta(m) && !here.mapped; // it has no other lobe
-            if (path.bounce > 1u && !whole) light_path_connect(path, at, e.flux * path.throughput, camera_medium, rng, odd);
+            bool bent = path.bounce > 1u + path.passed; // else lights are sampled for it
+            if (bent && !whole) light_path_connect(path, at, e.flux * path.throughput, camera_medium, rng, odd);
             path.alive = path.bounce < uniforms.max_bounces;
             if (path.alive) light_path_step(here, m, rng, path);
         }

@@ -15,7 +15,9 @@
 #include "path/normal_map.glsl"
 #include "path/bsdf_world.glsl"
 #include "path/dispersion.glsl"
+#include "path/straight.glsl"
 #include "path/path_sample.glsl"
+#include "path/shadow.glsl"
 #include "path/direct.glsl"
 #include "path/path_trace.glsl"
 #include "path/delta_chain.glsl"
@@ -36,6 +38,8 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     path.alive = true;
     path.found_pdf = PDF_DELTA;
     path.counts = true;
+    path.travelled = 0.0;
+    path.passed = 0u;
     path.eta_scale = 1.0;
     path.medium = medium;
     path.cone = cone_begin(d);
@@ -64,10 +68,11 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
         Material m;
         if (delta_chain(rng, path, here, m)) {
             Surface s = interaction_surface(here, hues_leading(m, path.hues));
-            path.lit = direct_context(path.at, here.front, here.facing, here.transmits);
+            LightContext lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);
-            direct_lighting(s, here, m, path.lit, share, rng, path);
+            direct_lighting(s, here, m, lit, share, rng, path);
             BsdfSample next = path_sample(s, here, m, rng, path);
+            if (!next.straight) path.lit = lit;
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);

@@ -15,6 +15,10 @@ struct Path {
     float found_pdf;
     bool counts;
     LightContext lit;
+    // Since then the path may have gone straight through surfaces (path/straight.glsl): so far, in metres. `passed` counts
+    // all such surfaces of the path, whose light is not clamped because of them.
+    float travelled;
+    uint passed;
     // The path has left the scene. It does so at most once, so that light from infinity is added once, by path_finish,
     // when all neighbouring lanes have ended, too.
     bool escaped;
@@ -81,8 +85,14 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     path.o = terminator_leave(path.at, next.d);
     path.at.flat_id = terminator_skip(path.at, next.d);
     path.d = next.d;
-    path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;
-    path.counts = ESTIMATOR != ESTIMATOR_LIGHT || next.is_delta;
+    if (next.straight) {
+        path.travelled += path.hit.t;
+        path.passed++;
+    } else {
+        path.travelled = 0.0;
+        path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;
+        path.counts = ESTIMATOR != ESTIMATOR_LIGHT || next.is_delta;
+    }
     path.throughput *= next.scatter.f / (path.alive ? next.scatter.pdf : 1.0);
     float reach = max_component(path.throughput);
     path.alive = path.alive && reach > 0.0;
@@ -102,6 +112,6 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
 void path_add_escaped(inout Path path) {
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
     vec3 arriving = found_light_outside(path.d, path.found_pdf, path.bounce > 0u, caustics_leave_out(path)) * max(path.eta_scale, 1.0);
-    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
+    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
 #endif
 }

@@ -10,11 +10,11 @@ void path_add_emission(inout Path path) {
     Cone cone = cone_none();
     if (path.found_pdf >= PDF_DELTA) cone = path.cone;
     vec3 arriving = found_light_emission(path.at, path.d, cone) * direct_found_weight(path) * path.eta_scale;
-    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
+    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
 #endif
 #if HAS_AMBIENT
     vec3 ambient = found_light_ambient(path.at, path.d, path.cone) * path.eta_scale;
-    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
+    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
 #endif
 }
 

@@ -197,6 +197,30 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
     return r;
 }
 
+// The material of the shape that was hit.
+uint shapes_material(Hit hit) {
+    uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK, material = 0u;
+#if HAS_SPHERES || HAS_BVH_SPHERES
+    if (kind == SHAPE_SPHERE) material = sphere_pick(index).material;
+#endif
+#if HAS_QUADS || HAS_BVH_QUADS
+    if (kind == SHAPE_QUAD) material = quad_pick(index).material;
+#endif
+#if HAS_BOXES || HAS_BVH_BOXES
+    if (kind == SHAPE_BOX) material = box_pick(index).material;
+#endif
+#if HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS
+    if (kind == SHAPE_ELLIPSOID) material = ellipsoid_pick(index).material;
+#endif
+#if HAS_TRIANGLES || HAS_BVH_TRIANGLES
+    if (kind == SHAPE_TRIANGLE) material = triangle_pick(index).material;
+#endif
+#if HAS_INSTANCES
+    if (int(hit.id) < -1) material = instance_load(instance_number(hit.id)).material; // as in shapes_point
+#endif
+    return material;
+}
+
 #if HAS_OPACITY
 // The point of a hit as far as its opacity depends on it; of a triangle that is much less than the whole point.
 SurfacePoint shapes_veil(Hit hit, vec3 o, vec3 d) {

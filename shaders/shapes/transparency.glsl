@@ -76,67 +76,6 @@ void transparency_nearest_tree(vec3 o, vec3 d, uvec2 skip, uint bounce, Sampler 
 }
 #endif
 
-// The share of light that passes the shapes in loops.
-float transparency_share_loop(vec3 o, vec3 d, float t_max, uvec2 skip, inout uint layer) {
-    float share = 1.0;
-    bool more;
-    do {
-        Hit hit = Hit(t_max, NONE, vec2(0.0));
-        transparency_next(o, d, skip, hit);
-        SurfacePoint at = shapes_point(hit, o, d);
-        more = hit.id != NONE;
-        if (more) {
-            share *= transparency_counts(layer) ? 1.0 - transparency_opacity(at, false) : 0.0;
-            o = shapes_leave(at, d);
-            skip.x = at.flat_id;
-            t_max -= hit.t;
-        }
-    } while (more && share > 0.0);
-    return share;
-}
-
-#if HAS_BVH && OPACITY_WALK
-// The share that passes the shapes of the tree.
-float transparency_share_tree(vec3 o, vec3 d, float t_max, uvec2 skip, inout uint layer) {
-    Passage on = transparency_begin(o, d);
-    Hit hit = Hit(t_max, NONE, vec2(0.0));
-    float share = 1.0, reach = skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
-    bool more;
-    do {
-        Hit veil = transparency_advance(skip, reach, true, t_max, false, on, hit);
-        if (hit.id != NONE) share = 0.0;
-        more = veil.id != NONE;
-        if (more) {
-            float left = t_max;
-            vec3 from = o;
-            do {
-                SurfacePoint at = shapes_veil(veil, from, d);
-                share *= transparency_counts(layer) ? 1.0 - transparency_opacity(at, false) : 0.0;
-                left -= veil.t;
-                from = shapes_leave(at, d);
-                veil = transparency_again(on, veil.id, from, skip, left);
-            } while (veil.id != NONE && share > 0.0);
-        } else {
-            more = transparency_change_tree(o, d, on);
-        }
-    } while (more && share > 0.0 && budget_lasts());
-    return share;
-}
-#endif
-
-// The share of light that passes all surfaces in (0, t_max), which is the mean of what the rays of
-// transparency_nearest do. `skip` is as in shapes_occluded.
-float transparency_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
-    float share = 1.0;
-    uint layer = 0u;
-#if !HAS_BVH || !OPACITY_WALK || HAS_SPHERES || HAS_QUADS || HAS_BOXES || HAS_ELLIPSOIDS || HAS_TRIANGLES
-    share = transparency_share_loop(o, d, t_max, skip, layer);
-#endif
-#if HAS_BVH && OPACITY_WALK
-    if (share > 0.0) share *= transparency_share_tree(o, d, t_max, skip, layer);
-#endif
-    return share;
-}
 #endif
 
 // The nearest surface that the ray does not pass; hit.t is its distance from o. `bounce` is how often the path was

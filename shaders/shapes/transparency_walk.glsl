@@ -1,7 +1,7 @@
 // Walks through shapes that may let rays pass. One walk down the tree meets all of them, in any order, and opaque ones
 // end it or shorten it as they do elsewhere. At a surface that is not surely opaque the walk stops until the other
 // lanes have found one, too: opacities that were read in the loop over a leaf's shapes would be read for all of them.
-#if HAS_OPACITY
+#if ANY_VEILS
 // The chance that a ray meets the surface. `hides`: hidden shapes let it pass.
 float transparency_opacity(SurfacePoint at, bool hides) {
 #if HAS_TEXTURES
@@ -16,9 +16,10 @@ float transparency_opacity(SurfacePoint at, bool hides) {
 }
 
 #if HAS_BVH && OPACITY_WALK
-// Whether all of a shape of the tree is opaque, as far as it is known without its texture coordinates.
-bool transparency_is_opaque(Tree tree, uint kind, uint index, bool hides) {
-#if HAS_VERTEX_COLORS
+// Whether all of a shape of the tree is opaque, as far as it is known without its texture coordinates. `straight`: light
+// that goes straight through a surface passes it.
+bool transparency_is_opaque(Tree tree, uint kind, uint index, bool hides, bool straight) {
+#if HAS_VERTEX_COLORS && HAS_OPACITY
     return false;
 #else
     uint material = 0u, shape = 0u;
@@ -57,7 +58,8 @@ bool transparency_is_opaque(Tree tree, uint kind, uint index, bool hides) {
         shape = tree.instance != NONE ? HIDDEN : s.shape; // of an instance it is not at hand
     }
 #endif
-    bool opaque = material_pick(material).opacity >= 1.0;
+    Material m = material_pick(material);
+    bool opaque = m.opacity >= 1.0 && !(straight && material_goes_straight(m));
 #if HAS_HIDDEN_SHAPES
     opaque = opaque && !(hides && (shape & HIDDEN) != 0u);
 #endif
@@ -86,11 +88,11 @@ Passage transparency_begin(vec3 o, vec3 d) {
 
 // Tests the next shape of a leaf: `hit` becomes the nearest one that is surely opaque, `veil` one before it that may
 // not be.
-void transparency_test(uvec2 skip, bool hides, inout Passage on, inout Hit hit, inout Hit veil) {
+void transparency_test(uvec2 skip, bool hides, bool straight, inout Passage on, inout Hit hit, inout Hit veil) {
     Hit next = Hit(hit.t, NONE, vec2(0.0));
     traverse_test(on.tree, on.ray, on.range.kind, on.range.index, skip, next);
     if (next.id != NONE) {
-        if (transparency_is_opaque(on.tree, on.range.kind, on.range.index, hides)) hit = next;
+        if (transparency_is_opaque(on.tree, on.range.kind, on.range.index, hides, straight)) hit = next;
         else veil = next;
     }
     on.range.index++;
@@ -103,7 +105,7 @@ void transparency_test(uvec2 skip, bool hides, inout Passage on, inout Hit hit, 
 }
 
 // Walks on to a surface before hit.t that may not be opaque, or to the end of the tree where there is none; with `any`
-// also to an opaque one before `start`.
+// also to an opaque one before `start`, as a ray to a light does.
 Hit transparency_advance(uvec2 skip, float reach, bool any, float start, bool hides, inout Passage on, inout Hit hit) {
     Hit veil = Hit(0.0, NONE, vec2(0.0));
     do {
@@ -112,7 +114,7 @@ Hit transparency_advance(uvec2 skip, float reach, bool any, float start, bool hi
             on.range = traverse_range(on.found.leaf);
         }
         if (on.found.leaf != 0u) {
-            do transparency_test(skip, hides, on, hit, veil);
+            do transparency_test(skip, hides, any, on, hit, veil);
             while (on.found.leaf != 0u && veil.id == NONE && !(any && hit.t < start));
         }
     } while (veil.id == NONE && on.found.instance == NONE && traverse_more(on.walk) && !(any && hit.t < start));

@@ -148,5 +148,6 @@ SCENES: dict[str, Doc] = {
     "SHARP_CAUSTICS": made_of({**GLASS, "roughness": 0}, lights=[LAMP_OF_NO_EXTENT]),
     "DISPERSION": made_of({**GLASS, "abbe": 30}),
     "THIN_WALLS": made_of({**GLASS, "thin_walled": True}),
+    "STRAIGHT": made_of({**GLASS, "thin_walled": True, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
 }  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, layout
-from gpu.kernels import flag_table
+from gpu.kernels import deltas
 from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from service.scene.material.principled import index_of_specular, roughness_of_gloss
@@ -26,8 +26,9 @@ def records_of(cases: list[dict[str, Any]]) -> np.ndarray:
 
 
 def echoed(gpu: Renderer, records: np.ndarray) -> np.ndarray:
-    """(n, 4): transmits, only mirrors or refracts, index of refraction, the coat's roughness."""
-    flags = PRINCIPLED_FLAGS | {"HAS_DISNEY"}
+    """(n, 4): transmits, and 2 more where light may go straight through; only mirrors or refracts; index of
+    refraction; the coat's roughness."""
+    flags = PRINCIPLED_FLAGS | {"HAS_DISNEY", "HAS_THIN_WALLS", "HAS_STRAIGHT"}
     return prober_of(gpu).run("materials.comp", len(records), {Slot.MATERIALS: records}, raised=flags)[0]
 
 
@@ -45,9 +46,28 @@ def test_flags_are_raised_by_what_the_shaders_ask(gpu: Renderer) -> None:
     cases = list(itertools.product(*edges.values()))
     records = records_of([dict(zip(edges, case, strict=True)) for case in cases])
     found = echoed(gpu, records)
-    assert np.array_equal(found[:, 0], flag_table._transmits(records))
-    assert np.array_equal(found[:, 1], flag_table._mirrors(records))
+    assert np.array_equal(found[:, 0], deltas.transmits(records) + 2.0 * deltas.goes_straight(records))
+    assert np.array_equal(found[:, 1], deltas.mirrors(records))
     assert 0 < found[:, 0].sum() < len(cases) and 0 < found[:, 1].sum() < len(cases)
+
+
+def test_light_goes_straight_through_what_python_says(gpu: Renderer) -> None:
+    given = np.float32(layout.TEXTURED)
+    edges = {
+        "transmission": (0.0, 0.5, given),
+        "thin_walled": (0.0, 1.0),
+        "roughness": (0.0, given, np.float32(layout.LEAST_ROUGHNESS)),
+        "ior": (layout.ABSENT, 1.0, 1.5, given),
+        "specular": (0.0, 0.5, given),
+        "dispersion": (0.0, 0.02),
+        "emission": (0.0, 1.0),
+        "clearcoat_roughness": (layout.ABSENT, 0.0, given),
+    }
+    cases = list(itertools.product(*edges.values()))
+    records = records_of([dict(zip(edges, case, strict=True)) for case in cases])
+    straight = echoed(gpu, records)[:, 0] >= 2
+    assert np.array_equal(straight, deltas.goes_straight(records))
+    assert 0 < straight.sum() < len(cases)
 
 
 def test_the_editor_shows_the_numbers_that_follow(gpu: Renderer) -> None:

@@ -139,11 +139,8 @@ bool openpbr_is_bare(Surface s, bool behind) {
     return behind && s.transmission > 0.0 && s.metallic < 1.0;
 }
 
-// Completes the surface with what depends on wo.
-void openpbr_face(vec3 wo, bool behind, inout Surface s) {
-    s.bare = openpbr_is_bare(s, behind);
-    base_side(behind != s.turned_out, s);
-    base_face(wo, s);
+// Sets what the layers keep of light from wo.
+void openpbr_face_layers(vec3 wo, inout Surface s) {
     s.coat_albedo = 0.0;
     s.sheen_albedo = 0.0;
 #if HAS_SHEEN
@@ -164,6 +161,14 @@ void openpbr_face(vec3 wo, bool behind, inout Surface s) {
         s.coat_darkening = vec3(1.0);
     }
 #endif
+}
+
+// Completes the surface with what depends on wo.
+void openpbr_face(vec3 wo, bool behind, inout Surface s) {
+    s.bare = openpbr_is_bare(s, behind);
+    base_side(behind != s.turned_out, s);
+    base_face(wo, s);
+    openpbr_face_layers(wo, s);
 }
 
 // What the layers leave of light that the base scatters from wi into wo.
@@ -308,6 +313,14 @@ float openpbr_delta_chance(Surface s, vec3 wo) {
 LobeSample openpbr_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     s.bare = openpbr_is_bare(s, behind);
     return base_sample_delta(wo, behind != s.turned_out, u_lobe, least, s);
+}
+
+// The share of light from wo that goes straight through, where some does; completes the surface as far as that needs.
+vec3 openpbr_straight(vec3 wo, bool behind, inout Surface s) {
+    s.bare = openpbr_is_bare(s, behind);
+    vec3 through = base_straight(wo, behind != s.turned_out, s);
+    openpbr_face_layers(wo, s);
+    return through * openpbr_layers(s, wo, -wo);
 }
 
 // The perfectly specular lobes, each as openpbr_sample gives it; those that the surface lacks are left alone.

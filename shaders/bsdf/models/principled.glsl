@@ -148,6 +148,24 @@ float principled_sheen_albedo(Surface s, float c) {
 #endif
 }
 
+// Sets what the layers keep of light from wo: they lie on the outer side only.
+void principled_face_layers(vec3 wo, inout Surface s) {
+    s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
+    s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
+}
+
+// The share of light that the layers leave to the perfectly smooth base, which sends it to wi.
+float principled_specular_layers(Surface s, vec3 wi) {
+    float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // in a mirror wi has the cosine of wo
+#if HAS_TRANSMISSION
+    if (wi.z < 0.0 && s.inside) {
+        coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
+        sheen_i = principled_sheen_albedo(s, wi.z);
+    }
+#endif
+    return principled_layers(s, coat_i, sheen_i);
+}
+
 // Completes the surface with what depends on wo.
 void principled_face(vec3 wo, bool behind, inout Surface s) {
     base_side(behind, s);
@@ -155,9 +173,7 @@ void principled_face(vec3 wo, bool behind, inout Surface s) {
     s.metal_mean = principled_conductor_mean(s);
 #endif
     base_face(wo, s);
-    // The layers lie on the outer side only.
-    s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
-    s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
+    principled_face_layers(wo, s);
 }
 
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
@@ -241,16 +257,7 @@ Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
 // Samples the microfacet lobe, which is picked with the chance `weight`.
 LobeSample principled_sample_specular(Surface s, vec3 wo, float v, vec2 u, float weight) {
     LobeSample r = base_sample_facet(s, wo, v, u, weight);
-    if (r.is_delta) {
-        float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // in a mirror wi has the cosine of wo
-#if HAS_TRANSMISSION
-        if (r.wi.z < 0.0 && s.inside) {
-            coat_i = principled_coat_albedo(s, principled_coat_cosine(s, r.wi));
-            sheen_i = principled_sheen_albedo(s, r.wi.z);
-        }
-#endif
-        r.scatter.f *= principled_layers(s, coat_i, sheen_i);
-    }
+    if (r.is_delta) r.scatter.f *= principled_specular_layers(s, r.wi);
     return r;
 }
 
@@ -307,6 +314,13 @@ float principled_delta_chance(Surface s, vec3 wo) {
 // What principled_sample gives for a surface that only mirrors or refracts, without the work for other lobes.
 LobeSample principled_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     return base_sample_delta(wo, behind, u_lobe, least, s);
+}
+
+// The share of light from wo that goes straight through, where some does; completes the surface as far as that needs.
+vec3 principled_straight(vec3 wo, bool behind, inout Surface s) {
+    vec3 through = base_straight(wo, behind, s);
+    principled_face_layers(wo, s);
+    return through * principled_specular_layers(s, -wo);
 }
 
 // The perfectly specular lobes, each as principled_sample gives it; those that the surface lacks are left alone.

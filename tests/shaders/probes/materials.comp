@@ -1,5 +1,5 @@
-// What kernels make of the numbers of material i: whether it transmits, whether it only mirrors or refracts, its index
-// of refraction and its coat's roughness.
+// What kernels make of the numbers of material i: whether it transmits, twice more where light may go straight through it,
+// whether it only mirrors or refracts, its index of refraction and its coat's roughness.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "math/constants.glsl"
@@ -14,5 +14,5 @@ void main() {
     if (i >= count) return;
     Material m = material_load(i);
     Surface s = surface_make(m, vec2(1.0, 0.0));
-    answers[i] = vec4(material_transmits(m), material_is_delta(m), s.eta_outside, s.coat_roughness);
+    answers[i] = vec4(float(material_transmits(m)) + 2.0 * float(material_goes_straight(m)), material_is_delta(m), s.eta_outside, s.coat_roughness);
 }

@@ -179,4 +179,15 @@ LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, float least, in
 #endif
     return LobeSample(wi, true, scatter, false);
 }
+
+// The share of light from wo that goes straight through a smooth surface, or through a rough one of index 1 without a
+// film. It looks up no table, and sets the members that this and the layers need.
+vec3 base_straight(vec3 wo, bool behind, inout Surface s) {
+    base_side(behind, s);
+#if HAS_FILM
+    s.albedo = vec4(0.0); // nothing is reflected by facets of index 1
+    s.film_cosine = wo.z;
+#endif
+    return base_transmittance(s, wo.z);
+}
 #endif
