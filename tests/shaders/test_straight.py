@@ -38,7 +38,7 @@ def scene(shapes: list[Doc], material: Doc | None = None, **more: Any) -> Doc:
 
 def lit(gpu: Renderer, shapes: list[Doc], material: Doc | None = None, samples: int = 16, **more: Any) -> np.ndarray:
     """What the camera sees of the floor. Panes that are passed are bounces: of two by default."""
-    given = {k: more.pop(k) for k in ("estimator", "max_bounces") if k in more}
+    given = {k: more.pop(k) for k in ("estimator", "max_bounces", "caustics", "filter_glossy") if k in more}
     image = render(gpu, scene(shapes, material, **more), samples, width=8, height=8, **{"max_bounces": 3, **given})
     return np.asarray(image[..., :3].mean((0, 1)))
 
@@ -213,6 +213,15 @@ def test_every_passage_is_a_bounce(gpu: Renderer, estimator: str) -> None:
     for bounces, expected in ((1, 0), (2, 0), (3, 1)):
         found = lit(gpu, [lamp, *panes], clear, 1 << 10, materials=glow, estimator=estimator, max_bounces=bounces)
         np.testing.assert_allclose(found, expected * 0.5 * 2 * seen, rtol=0.01)
+
+
+@pytest.mark.parametrize("more", [{"caustics": "light"}, {"caustics": "paths"}, {"filter_glossy": 0.3}])
+def test_it_is_no_caustic_and_never_blurred(gpu: Renderer, more: Doc) -> None:
+    """Neither what is traced from the lights nor a bias towards rough surfaces counts it again."""
+    lamp = ball("lamp", (0, 0, 2), 0.1)
+    bare, clear = (lit(gpu, [lamp, *pane], samples=256, caustics="paths") for pane in ([], [PANE]))
+    np.testing.assert_allclose(lit(gpu, [lamp, PANE], samples=256, **more), clear, rtol=2e-3)
+    np.testing.assert_allclose(clear / bare, passed(1, 1.5), rtol=5e-3)
 
 
 def test_the_estimators_agree(gpu: Renderer) -> None:
