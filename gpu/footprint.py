@@ -31,11 +31,14 @@ def unshared_bytes(scene: SceneArrays) -> int:
     return scene_bytes(scene) - shared
 
 
-def picture_bytes(settings: RenderSettings, guided: bool = False, covered: bool = False) -> int:
-    """About how many bytes a picture takes on the device at most, with the AOVs of the first hit (`guided`) and
-    with coverage, or without. A block of samples takes memory from sample 9 on."""
+def picture_bytes(
+    settings: RenderSettings, guided: bool = False, covered: bool = False, splatted: bool = False
+) -> int:
+    """About how many bytes a picture takes on the device at most, with the AOVs of the first hit (`guided`), with
+    coverage and with caustics that are traced from the lights (`splatted`), or without. A block of samples takes
+    memory from sample 9 on."""
     block = PLAN_BYTES if settings.adaptive else ACCUMULATOR_BYTES
     pixel_bytes = ACCUMULATOR_BYTES + block + (FIRST_HIT_BYTES if guided else 0) + (COVER_BYTES if covered else 0)
-    if settings.caustics != "paths" and not settings.adaptive:
+    if splatted:
         pixel_bytes += SPLAT_BYTES
     return settings.width * settings.height * pixel_bytes + FIXED_BYTES

@@ -27,6 +27,11 @@ _READ = ("lights", "materials", "environment", "spheres", "quads", "boxes", "ell
 _SMOOTHED = 2  # pixels on each side over which an estimate of variance, from one difference, is averaged
 
 
+def reversed_rays(defines: dict[str, object]) -> dict[str, object]:
+    """The defines that lighttrace.comp is compiled with, from those of a picture's other kernels."""
+    return defines | {"REVERSED": 1}
+
+
 class LightPaths:
     """The sums of one picture, whose first `even` and `odd` paths they have. They take memory where the kernel leaves
     caustics out of the camera's paths."""
@@ -59,7 +64,7 @@ class LightPaths:
         if not defines["CAUSTICS"]:
             self.release()
             return 0.0
-        kernel = self._kernels.get(ENTRY, defines | {"REVERSED": 1})
+        kernel = self._kernels.get(ENTRY, reversed_rays(defines))
         compile_ms = self._kernels.last_compile_ms
         if kernel is not self._kernel:
             self._kernels.hold(kernel)

@@ -15,12 +15,12 @@ from gpu.device.textures import KINDS, bound_textures, rows
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
-from gpu.picture import accumulators, noise_meter, resolve
+from gpu.picture import accumulators, light_paths, noise_meter, resolve
 from gpu.picture.look import Look
 from gpu.settings import TONE_MAPS, RenderSettings
 
 # The kernels that depend on the scene; `common_keys` has the others.
-ENTRY, GUIDES, COVER = "pathtrace.comp", "guides.comp", "cover.comp"
+ENTRY, GUIDES, COVER, LIGHT = "pathtrace.comp", "guides.comp", "cover.comp", "lighttrace.comp"
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,14 @@ def kernel_key(
     """The key of the kernel `entry` for a picture of `arrays` where these flags are raised."""
     defines = features.defines(raised, settings, features.counts(arrays))
     return KernelKey(tuple(defines.items()), _textures(arrays, raised), entry)
+
+
+def light_key(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]) -> KernelKey | None:
+    """The key of the kernel that traces such a picture's caustics from the lights; None where it has none."""
+    if not features.traces_caustics(raised, settings):
+        return None
+    defines = light_paths.reversed_rays(features.defines(raised, settings, features.counts(arrays)))
+    return KernelKey(tuple(defines.items()), _textures(arrays, raised), LIGHT)
 
 
 def flags(arrays: SceneArrays, editing: bool = False) -> frozenset[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from gpu import RenderSettings
 from gpu.precompile import kernel_keys
 from service.ipc.messages import Update
@@ -11,6 +13,9 @@ from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
 from service.worker.view.fallback_preview import FallbackPreview
+
+if TYPE_CHECKING:
+    from gpu import KernelKey
 
 
 class Updates:
@@ -66,20 +71,26 @@ class Updates:
         if request is None:
             return False
         watched = (update.interactive or self._tracker.interactive) and not paused
-        shows = watched and not self._wait.compiler.knows(request.key) and self.preview.can(request)
-        if not self._wait.begin(request.key, shows):
+        return any(self._waits_for(key, request, update.generation, watched) for key in request.keys)
+
+    def _waits_for(self, key: KernelKey, request: KernelRequest, generation: int, watched: bool) -> bool:
+        """Whether this kernel is being compiled, which may be shown by another one meanwhile."""
+        assert self._wait.compiler is not None
+        shows = watched and not self._wait.compiler.knows(key) and self.preview.can(request)
+        if not self._wait.begin(key, shows):
             return False
-        if shows:
-            self.preview.begin(request, update.generation)
-        else:
+        if not shows:
             self.preview.release()
+        elif self.preview.generation != generation or not self.preview.shows:
+            self.preview.begin(request, generation)
         return True
 
     def applied(self, update: Update) -> None:
         """The pending update was applied, or refused; in the first case the renderer has met its kernel."""
         self.preview.release()
         if self._request is not None and self._tracker.generation == update.generation:
-            self._wait.met(self._request.key)
+            for key in self._request.keys:
+                self._wait.met(key)
         self._edited = self._request = None
 
     def take_compile_ms(self) -> float:

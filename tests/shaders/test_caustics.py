@@ -138,3 +138,41 @@ def test_totals_are_those_of_a_light_tracer(gpu: Renderer, name: str, bounces: i
     expected = light_tracer(LAMPS[name], bounces)
     assert expected > 0.01
     assert caustic(made).mean() == pytest.approx(expected, rel=0.02)
+
+
+WIDE_SUN = SUN | {"angular_diameter": 20}
+PERSPECTIVE = {"position": [-3, 2.5, 5], "target": [0.5, 0.3, 0], "vfov": 45}
+SHINES = {"type": "diffuse", "albedo": 0, "emission": 6}
+QUAD_LAMP = {"type": "quad", "origin": [-2, 3, -0.5], "u": [0.8, 0, 0], "v": [0, 0, 0.8], "material": "lamp"}
+ROUND_LAMP = {"type": "disk", "center": [-1.6, 3.2, 0.5], "normal": [0.5, -0.7, 0], "radius": 0.5, "material": "lamp"}
+BALL_LAMP = {"type": "sphere", "center": [-1.6, 3.2, 0.5], "radius": 0.4, "material": "lamp"}
+AGREE: dict[str, dict[str, Any]] = {
+    "a lens": {"camera": PERSPECTIVE | {"aperture_radius": 0.3, "focus_distance": 4}},
+    "a panorama": {"camera": {"type": "panorama", "position": [-2, 1.5, 2], "target": [0, 0.3, 0]}},
+    "gold": {"ball": {"type": "principled", "metallic": 1, "roughness": 0, "base_color": [1, 0.8, 0.3]}},
+    "tinted": {"ball": GLASS | {"attenuation_color": [0.3, 0.7, 0.9], "attenuation_distance": 0.7}},
+    "a quad and a disk": {"lamps": [QUAD_LAMP, ROUND_LAMP]},
+    "a ball": {"lamps": [BALL_LAMP]},
+}
+
+
+@pytest.mark.parametrize("name", AGREE)
+def test_both_ways_agree(gpu: Renderer, name: str) -> None:
+    """The mean of the picture, within four deviations, which are a small part of the caustic's light."""
+    how = {"camera": PERSPECTIVE, **AGREE[name]}
+    lamps = how.pop("lamps", [])
+    seen = scene(WIDE_SUN, **how)
+    if lamps:
+        seen["lights"], seen["materials"]["lamp"] = [], SHINES
+        seen["shapes"] += lamps
+    settings: dict[str, Any] = {"width": 24, "height": 24, "max_bounces": 6, "roulette_depth": 99}
+    means, errors, brought = [], [], 0.0
+    for caustics in ("paths", "light"):
+        made = picture(gpu, seen, 8192, caustics=caustics, **settings)
+        means.append(made.read()[..., :3].mean(dtype=float))
+        errors.append(made.read("variance").mean(axis=2).sum(dtype=float) / 24**4)
+        if caustics == "light":
+            brought = caustic(made).mean()
+        made.release()
+    deviation = np.sqrt(sum(errors))
+    assert abs(means[0] - means[1]) < 4 * deviation and brought > 4 * deviation

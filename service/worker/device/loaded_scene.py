@@ -99,11 +99,17 @@ def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
 
 @dataclass(frozen=True)
 class KernelRequest:
-    """The arrays and settings that an update leads to, and the kernel that they need."""
+    """The arrays and settings that an update leads to, and the kernels that they need: that of the camera's paths
+    and that of its paths of light, if there are any."""
 
     arrays: SceneArrays
     settings: RenderSettings
     key: KernelKey
+    light: KernelKey | None = None
+
+    @property
+    def keys(self) -> list[KernelKey]:
+        return [key for key in (self.key, self.light) if key is not None]
 
 
 def begin_key(foreseen: Foresee) -> KernelKey:
@@ -155,4 +161,6 @@ def kernel_request(
     settings = old if update.settings is None else RenderSettings(**update.settings)
     if settings is None or edited is None or (loaded and update.settings is None and edited.same_kernel):
         return None
-    return KernelRequest(edited.arrays, settings, kernel_keys.kernel_key(edited.arrays, settings, edited.flags))
+    key = kernel_keys.kernel_key(edited.arrays, settings, edited.flags)
+    light = kernel_keys.light_key(edited.arrays, settings, edited.flags)
+    return KernelRequest(edited.arrays, settings, key, light)

@@ -42,7 +42,11 @@ class ResolutionLadder:
     @property
     def bytes(self) -> int:
         """The bytes that the pictures take on the device."""
-        return sum(picture_bytes(each.settings, each.guided, each.covered) for each in self._pictures.values())
+        taken = (
+            picture_bytes(each.settings, each.guided, each.covered, each.traces_caustics)
+            for each in self._pictures.values()
+        )
+        return sum(taken)
 
     def picture(self, scale: float) -> Picture:
         if scale not in self._pictures:

@@ -75,6 +75,11 @@ class FallbackPreview:
         return self._scene.bytes + self._ladder.bytes
 
     @property
+    def shows(self) -> bool:
+        """Whether there is something that it shows."""
+        return self._ladder is not None
+
+    @property
     def due(self) -> bool:
         """Whether there is more to trace."""
         return self._ladder is not None and (self.scale != self._next or self._spent_s < ENOUGH_S)
