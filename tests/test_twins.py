@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +16,8 @@ from service.assets.gltf import json_view
 from service.pack.lights import light_bounds
 from service.scene import numbers
 from tests.documents import packed
+
+ROOT = Path(__file__).parent.parent
 
 
 def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> None:
@@ -57,3 +62,13 @@ def test_the_lights_tree_bounds_a_spot_as_its_shader_fades_it(angles: tuple[floa
     np.testing.assert_allclose(bounds.normals, inner, atol=2e-3 * (1 - outer))
     np.testing.assert_allclose(np.arccos(bounds.beyond), np.radians(angles[1] - angles[0]), atol=0.02)
     np.testing.assert_allclose(bounds.solid_angle, np.pi * (2 - inner - outer), rtol=2e-3)
+
+
+def test_one_module_of_the_browser_knows_the_field_of_view() -> None:
+    """Others write it into a camera of their own, or name the field; what it means stands in one place."""
+    for path in sorted((ROOT / "web").rglob("*.js")):
+        if path == ROOT / "web/document/camera.js":
+            continue
+        code = re.sub(r"//.*", "", path.read_text())
+        assert not re.findall(r"\bvfov\b(?!: [0-9.]+ )", code), path
+        assert not re.findall(r"Math\.tan\([^;]*(?:fov|field)", code), path
