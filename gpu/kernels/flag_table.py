@@ -17,7 +17,7 @@ from gpu.kernels import caustics, textures_glsl
 from gpu.kernels.deltas import filmed, goes_straight, mirrors, transmits
 from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
-from gpu.layout.models import BY_NUMBER, COATED, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
+from gpu.layout.models import BY_NUMBER, COATED, COVERING, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
 Asks = Callable[[SceneArrays], bool]
 ANYWHERE = ("any scene",)  # in place of the names of flags
@@ -203,6 +203,13 @@ def _shines_both(s: SceneArrays) -> bool:
     return bool(((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any())
 
 
+def _layered(s: SceneArrays) -> bool:
+    """Whether some emission lies under a coat or fuzz."""
+    m = s.materials
+    layers = (m["clearcoat"] > 0) | (m["sheen"] > 0)
+    return bool((of(m, COVERING) & layers & (m["emission"] > 0).any(axis=1)).any())
+
+
 def _veiled(s: SceneArrays) -> bool:
     """Whether the emission or the opacity of an emitting shape varies over its surface."""
     shines = (s.materials["emission"] > 0).any(axis=1)
@@ -304,6 +311,7 @@ _ROWS = (
     _of_textures("HAS_HEIGHTS", _has_heights),
     _of_textures("HAS_COAT_NORMALS", _coat_apart, previewed=_normal_mapped),
     _of_textures("HAS_TEXTURED_LIGHTS", _veiled, previewed=_where("HAS_TEXTURES")),
+    Flag("HAS_LAYERED_LIGHTS", _layered, previewed=_any_of(COVERING), in_general=False),
     Flag("HAS_EMISSION", lambda s: bool((s.materials["emission"] > 0).any()), previewed=_always),
     Flag("HAS_EMISSION_BOTH", _shines_both, previewed=lambda s: bool((s.materials["emission_sides"] == 2).any())),
     Flag("HAS_LIGHTS", lambda s: len(s.lights) > 0, previewed=_always),

@@ -17,6 +17,7 @@ and where the row in `gpu/layout/models.py` says so:
                                                with a chance of at least `least`
     NAME_straight(wo, behind, s)               `may_be_delta`: the share of light from wo that goes straight through a
                                                surface that bends nothing
+    NAME_emitted(s, wo)                        `covers_emission`: what its layers leave of its own light
     NAME_terms(s, wo, wi, wm)                  `has_terms`: the Terms for a facet's normal wm
     NAME_metal(s, c), NAME_metal_mean(s)       `needs_tables`: the metal's reflectance at cosine c, and its mean
     NAME_tinted(s, f)                          `needs_tables`: the dielectric's reflectance f with the model's colour
@@ -77,6 +78,8 @@ def text() -> str:
                     _only(deltas, "r = {}_sample_delta(wo, behind, u_lobe, least, s);")),
         _dispatcher("vec3 models_straight(vec3 wo, bool behind, inout Surface s)",
                     "vec3 r = vec3(0.0);", _only(deltas, "r = {}_straight(wo, behind, s);")),
+        _dispatcher("vec3 models_emitted(Surface s, vec3 wo)",
+                    "vec3 r = vec3(1.0);", _ladder(_with("covers_emission"), "r = {}_emitted(s, wo);")),
         _dispatcher("Terms models_terms(Surface s, vec3 wo, vec3 wi, vec3 wm)",
                     "Terms r = Terms(vec3(0.0), 0.0, 0.0, true);",
                     _ladder(_with("has_terms"), "r = {}_terms(s, wo, wi, wm);")),

@@ -46,6 +46,7 @@ class Model:
     needs_tables: bool = False  # it looks up what its lobes lose, in the tables of gpu/tables/energy.py
     has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
     has_coat_normals: bool = False  # its coat may have a normal of its own
+    covers_emission: bool = False  # its emission lies under its coat and its fuzz
     has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
     optional: tuple[str, ...] = ()  # members of `layout.Material` that raise a flag where they are above 0
     # What it has besides `layout.Material`, and the member of `SceneArrays` that begins with one for each material.
@@ -118,6 +119,7 @@ MODELS = (
         needs_tables=True,
         has_terms=True,
         has_coat_normals=True,
+        covers_emission=True,
         has_members=True,
         optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness", "film_thickness"),
         in_general=False,
@@ -136,6 +138,7 @@ def of(materials: np.ndarray, models: Iterable[Model]) -> np.ndarray:
 
 TRANSMITTING = tuple(model for model in MODELS if model.transmits)
 DELTA = tuple(model for model in MODELS if model.may_be_delta)
+COVERING = tuple(model for model in MODELS if model.covers_emission)
 COATED = tuple(model for model in MODELS if model.has_coat_normals)
 TABULATED = tuple(model for model in MODELS if model.needs_tables)
 

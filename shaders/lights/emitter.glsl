@@ -42,7 +42,11 @@ Emitter emitter_make(Light l) {
 #endif
 }
 
-#if HAS_TEXTURED_LIGHTS
+#if HAS_LAYERED_LIGHTS
+vec3 light_layers(SurfacePoint at, vec3 w); // path/light_layers.glsl
+#endif
+
+#if HAS_TEXTURED_LIGHTS || HAS_LAYERED_LIGHTS
 // The barycentric weights of the place q on the shape `id`, if it is a triangle.
 vec2 emitter_uv(uint id, vec3 q) {
     vec2 uv = vec2(0.0);
@@ -55,7 +59,9 @@ vec2 emitter_uv(uint id, vec3 q) {
 #endif
     return uv;
 }
+#endif
 
+#if HAS_TEXTURED_LIGHTS
 // The distance from p to the near half of a ball or a cylinder whose far half is sampled; 0 for other shapes.
 float emitter_near(LightSample s, vec3 p) {
     uint index = s.id & LEAF_FIRST_MASK, kind = s.id >> LEAF_KIND_SHIFT;
@@ -107,5 +113,11 @@ void emitter_shine(Light l, Emitter e, vec3 p, inout LightSample s) {
 #endif
 #if HAS_TEXTURED_LIGHTS
     if (l.kind >= LIGHT_SPHERE && s.pdf > 0.0) s.radiance *= emitter_texture(s, p);
+#endif
+#if HAS_LAYERED_LIGHTS
+    if (l.kind >= LIGHT_SPHERE && s.pdf > 0.0) {
+        vec3 q = p + s.t * s.wi;
+        s.radiance *= light_layers(shapes_point(Hit(0.0, s.id, emitter_uv(s.id, q)), q, vec3(0.0, 0.0, 1.0)), -s.wi);
+    }
 #endif
 }

@@ -44,8 +44,8 @@ vec3 found_light_outside(vec3 d, float pdf, bool scattered, bool sunless) {
     return arriving;
 }
 
-// Emission towards the side that a ray along d came from: the outward side, unless both sides of the material shine.
-vec3 found_light_emission(SurfacePoint at, vec3 d, Cone cone) {
+// Emission, without the layers on it, towards the side that a ray along d came from: the outward side, unless both sides of the material shine.
+vec3 found_light_bare(SurfacePoint at, vec3 d, Cone cone) {
 #if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
     bool both = material_pick(at.material).emission_sides == 2u;
     if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at, cone_footprint(cone, at, d));
@@ -58,6 +58,15 @@ vec3 found_light_emission(SurfacePoint at, vec3 d, Cone cone) {
     if (at.light != NONE && dot(d, at.ng) < 0.0) return material_pick(at.material).emission;
 #endif
     return vec3(0.0);
+}
+
+// Emission as it leaves the surface, likewise.
+vec3 found_light_emission(SurfacePoint at, vec3 d, Cone cone) {
+    vec3 emission = found_light_bare(at, d, cone);
+#if HAS_LAYERED_LIGHTS
+    emission *= light_layers(at, -d);
+#endif
+    return emission;
 }
 
 // Ambient radiance, a constant that some models add: both sides send it, and it is never sampled as a light.

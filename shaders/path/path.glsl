@@ -15,6 +15,7 @@
 #include "path/normal_map.glsl"
 #include "path/bsdf_world.glsl"
 #include "path/dispersion.glsl"
+#include "path/light_layers.glsl"
 #include "path/straight.glsl"
 #include "path/path_sample.glsl"
 #include "path/shadow.glsl"

@@ -323,6 +323,17 @@ vec3 openpbr_straight(vec3 wo, bool behind, inout Surface s) {
     return through * openpbr_layers(s, wo, -wo);
 }
 
+// What fuzz and coat leave of light that is sent out from under them towards wo, without the reflections below the coat.
+vec3 openpbr_emitted(Surface s, vec3 wo) {
+    openpbr_face_layers(wo, s);
+    vec3 left = vec3(1.0 - s.sheen_albedo);
+#if HAS_CLEARCOAT
+    vec3 crossed = coat_crossed(s, coat_to_local(s, wo).z);
+    left *= mix(vec3(1.0), crossed, s.clearcoat) * (1.0 - s.coat_albedo);
+#endif
+    return left;
+}
+
 // The perfectly specular lobes, each as openpbr_sample gives it; those that the surface lacks are left alone.
 void openpbr_deltas(Surface s, vec3 wo, inout LobeSample deltas[BSDF_DELTAS]) {
     OpenpbrWeights w = openpbr_weights(s, wo);
