@@ -77,7 +77,7 @@ def test_lists_have_titles(kind: str) -> None:
 
 def test_there_is_enough_to_choose_from() -> None:
     wanted = {"shader-ball", "sphere-on-floor", "cornell-empty", "cornell-boxes", "cornell-spheres", "roughness-row",
-              "sphere-field",
+              "sphere-field", "prism",
               "generated-mesh", "point-lights", "cornell-glossy", "cornell-open", "disney-parameters",
               "disney-grid"}  # fmt: skip
     assert wanted <= set(SCENES)
