@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, Request
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -108,6 +109,50 @@ def test_going_back_to_a_model_brings_back_what_was_there(editor: Editor) -> Non
     assert (
         page.input_value("#model") == "blinn_phong" and page.input_value(editor.field("shininess", "number")) == "77"
     )
+    assert editor.text("#messages") == "" and editor.complaints == []
+
+
+def test_variant_b_becomes_openpbr_with_its_groups_and_lobes(editor: Editor) -> None:
+    """Coat and sheen come along; each group of the schema is a fold, and each lobe has a curve."""
+    editor.settled()
+    page = editor.page
+    material = {"type": "principled", "clearcoat": 0.8, "sheen": 0.5, "film_thickness": 400}
+    page.evaluate("(text) => { navigator.clipboard.readText = async () => text; }", json.dumps(material))
+    editor.act("paste-material")
+    editor.settled()
+    page.click("#compare")
+    editor.wait("the bar", lambda: page.is_visible("#comparison"))
+    turn = "#comparison select[aria-label^=Turn]"
+    assert "OpenPBR" in page.inner_text(turn)
+    page.select_option(turn, "openpbr")
+    page.click("#comparison [data-value=b]")
+    editor.wait("B", lambda: page.input_value("#model") == "openpbr")
+    shown = {name: page.input_value(editor.field(name, "number")) for name in (
+        "coat_weight", "fuzz_weight", "thin_film_weight", "thin_film_thickness", "coat_darkening",
+    )}  # fmt: skip
+    assert shown == {
+        "coat_weight": "0.8", "fuzz_weight": "0.5", "thin_film_weight": "1", "thin_film_thickness": "0.4",
+        "coat_darkening": "0",
+    }  # fmt: skip
+    folds = page.locator("#panel .fold h3").all_text_contents()
+    found = [each for each in folds if each]
+    assert found == ["Base", "Specular", "Coat", "Sheen", "Transmission", "Film", "Emission", "Geometry"]
+    turned = set[str]()
+
+    def note(request: Request) -> None:
+        if request.url.endswith("/v1/materials/convert"):
+            turned.add(request.post_data_json["to"])
+
+    page.on("request", note)
+    page.click("#show-lobe")
+    page.wait_for_timeout(50)
+    done = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"
+    editor.wait("the plot", lambda: page.evaluate(done))
+    page.check("#lobe >> label:has-text('By lobe') >> input")
+    wanted = {"A, Principled", "B, OpenPBR", "diffuse", "specular", "multiscatter", "sheen", "clearcoat"}
+    editor.wait("its lobes", lambda: set(page.inner_text("#lobe .lobe-legend").split("\n")) == wanted)
+    editor.wait("the other models, of which kernels are compiled ahead", lambda: "microfacet" in turned)
+    assert "measured" not in turned, "that is of a file"
     assert editor.text("#messages") == "" and editor.complaints == []
 
 

@@ -338,9 +338,12 @@ export class LobePanel {
     this.#warming.begin([{ material: this.#materials().materials.a, needs: this.#view.needs }], 0);
   }
 
-  // What may be asked for next: the other views of this material, and this view of other models.
+  // What may be asked for next: the other views of this material, and this view of other models, but of those that a
+  // file makes.
   #warm(material) {
-    const others = Object.keys(this.models).filter((type) => type !== material.type);
+    const isOfFile = (type) =>
+      fields(this.schema, this.models[type]).some(({ widget, required }) => widget === "file" && required);
+    const others = Object.keys(this.models).filter((type) => type !== material.type && !isOfFile(type));
     this.#warming.begin([
       ...this.views.map((name) => ({ material, needs: VIEWS[name].needs })),
       ...others.map((type) => ({ material, type, needs: this.#view.needs })),
