@@ -113,7 +113,16 @@ def _many_lights() -> Document:
 
 
 def _mesh() -> Document:
-    scene = _balls(presets.get("materials", "car-paint"))
+    scene = _balls(
+        {
+            "type": "principled",
+            "base_color": [0.02, 0.09, 0.36],
+            "metallic": 0.75,
+            "roughness": 0.42,
+            "clearcoat": 1,
+            "clearcoat_roughness": 0.02,
+        }
+    )
     mesh = {"type": "mesh", "asset": MESH, "material": "ball 0"}
     camera = {"position": [0, 1.6, 4.2], "target": [0, 0.9, 0], "vfov": 40}
     return {**scene, "camera": camera, "shapes": [mesh, *scene["shapes"][1:]]}
