@@ -176,3 +176,15 @@ def test_both_ways_agree(gpu: Renderer, name: str) -> None:
         made.release()
     deviation = np.sqrt(sum(errors))
     assert abs(means[0] - means[1]) < 4 * deviation and brought > 4 * deviation
+
+
+def test_filter_glossy_blurs_what_no_path_finds(gpu: Renderer) -> None:
+    """The camera's paths then find about as much light of a lamp without extent as a light tracer does, elsewhere."""
+    settings: dict[str, Any] = {"width": 48, "height": 48, "max_bounces": 8}
+    seen = scene(LAMPS["point"])
+    means = [
+        picture(gpu, seen, 64, filter_glossy=least, **settings).read()[..., :3].mean(dtype=float)
+        for least in (0.0, 0.3)
+    ]
+    brought = light_tracer(LAMPS["point"], 8)
+    assert 0.5 * brought < means[1] - means[0] < 1.5 * brought
