@@ -13,6 +13,7 @@ from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from tests import film
 from tests.probing import OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, openpbr, prober_of, rare
+from tests.rendering import document, render
 
 ANGLES = (0, 30, 50, 65, 80)
 THICKNESSES = (30, 80, 150, 250, 400, 650, 1200, 5000)
@@ -155,3 +156,17 @@ def test_white_under_a_film_loses_little_and_never_gains(prober: Prober, base: s
         high, low = int(np.argmax(over)), int(np.argmin(under))
         assert over[high] < 1.003, (over[high], error[high], m[high], asks[high])
         assert under[low] > 0.98, (under[low], error[low], m[low], asks[low])
+
+
+def test_a_film_on_dispersive_glass_keeps_the_furnace(gpu: Renderer) -> None:
+    """A filmed ball of flint glass is not seen in a white world, whichever channel leads."""
+    glass = {"type": "principled", "transmission": 1, "base_color": 1, "roughness": 0, "ior": 1.7, "abbe": 20}
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
+    scene = document(
+        [ball], {"m": {**glass, "film_thickness": 320, "film_ior": 1.35}},
+        environment={"type": "constant", "radiance": 1},
+        camera={"position": [0, 0, 4], "target": [0, 0, 0], "vfov": 24},
+    )  # fmt: skip
+    image = render(gpu, scene, 128, max_bounces=64)[..., :3].mean((0, 1))
+    assert (image > 0.98).all() and (image < 1.003).all(), image
+    assert np.ptp(image) < 5e-3, image
