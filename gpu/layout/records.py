@@ -333,6 +333,7 @@ class Uniforms(Record):
     filter_glossy: f32  # least roughness after a path's first scattering
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
+    glint_chance: f32  # least of reflection, and of refraction, at a smooth surface that the camera sees
 
 
 WORK_GROUP = 8  # invocations a side of the work groups of kernels over pixels; fewer than 8 can hang llvmpipe

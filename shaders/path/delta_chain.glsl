@@ -2,20 +2,11 @@
 // runs both sides of every `if`, a loop of their own saves such paths the work that only other surfaces need.
 
 #if HAS_MIRRORS
-// The least chance that the surface that the camera sees is followed by reflection, and by refraction. By their light
-// alone a lamp in clear glass is picked one time in 25, and is a cluster of white dots. Where no lamp can be seen, the
-// chances are those of the light, which is less noise where both sides are about as bright.
-#if HAS_EMISSION || HAS_SUN || HAS_SUN_DISKS
-const float DELTA_GLINT = 1.0 / 3.0;
-#else
-const float DELTA_GLINT = 0.0;
-#endif
-
 // Scatters as bsdf_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
     Surface s = surface_make(hues_leading(m, path.hues), here.tangent);
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
-    LobeSample lobe = dispersion_sample_delta(here, m, u, path.bounce == 0u ? DELTA_GLINT : 0.0, s, path.hues);
+    LobeSample lobe = dispersion_sample_delta(here, m, u, path.bounce == 0u ? uniforms.glint_chance : 0.0, s, path.hues);
     BsdfSample next;
     next.d = basis_to_world(here.basis, lobe.wi);
     next.scatter = lobe.scatter;

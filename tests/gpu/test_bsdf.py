@@ -17,7 +17,7 @@ from gpu.precompile import kernel_keys
 from service.pack import pack_material
 from service.scene.material.microfacet import MicrofacetMaterial
 from tests import baseline, disney, microfacets
-from tests.lobes import PRINCIPLED, ROWS
+from tests.lobes import LAYERED, PRINCIPLED, ROWS
 from tests.probing import materials
 
 P = NUMBERS["principled"]
@@ -355,7 +355,11 @@ def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
     foreseen = list(kernel_keys.bsdf_keys())
     used = set()
     lab = pack_material(MicrofacetMaterial(type="microfacet"))
-    for material in [*map(lone, ALL.values()), lab]:
+    measured = models.BY_NUMBER[NUMBERS["measured"]]
+    assert measured.record is not None
+    file = lone(materials(model=measured.number))
+    setattr(file, measured.records, np.zeros((measured.record.words // 4, 4), np.uint32))
+    for material in [*map(lone, (ALL | LAYERED).values()), lab, file]:
         glowing = material.materials.copy()
         glowing["emission"], glowing["opacity"], glowing["attenuation_distance"] = 3.0, 0.5, 1.0
         for question in kernels.ENTRIES:
