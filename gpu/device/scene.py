@@ -30,8 +30,8 @@ _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in bindings.COUNTED.it
 _BLOCK_MAX = 16384  # bytes of a uniform block on every driver; of a longer buffer kernels see the first records
 RADIANCE_MAX = 1e20  # most of a texel times the environment's scale
 # The least chance that the surface that the camera sees is followed by reflection, and by refraction, in scenes with
-# a lamp or a sun. By their light alone a lamp in clear glass is picked one time in 25, and is a cluster of white dots.
-# In other scenes the chances are those of the light, which is less noise where both sides are about as bright.
+# a lamp or a sun. By their light alone a lamp in clear glass is picked one time in 25: it shows as white dots. In
+# other scenes the chances are those of the light, which is less noise where both sides are about as bright.
 GLINT_CHANCE = 1 / 3
 
 

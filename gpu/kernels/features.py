@@ -55,6 +55,8 @@ def touched(raised: frozenset[str], anywhere: bool = True) -> list[frozenset[str
                 groups.setdefault(name, []).append(flag.name)
     combined = (some for group in groups.values() for n in range(len(group)) for some in combinations(group, n + 1))
     found = {raised.union(some, _following(raised, frozenset(some))) for some in combined}
+    if anywhere:
+        found |= {raised | {flag.name} for flag in FLAGS.values() if beside(flag.alone_with, raised)}
     return sorted(found - {raised}, key=lambda flags: (len(flags), sorted(flags)))
 
 

@@ -46,6 +46,8 @@ class Flag:
     # The code is expensive: a kernel with it is compiled in idle time as soon as the scene is shown. Where several
     # flags are compiled with the same one, there is a kernel for each combination.
     compiled_with: tuple[str, ...] = ()
+    # It is expensive and rare: one more kernel has it and none of those above, and no superset kernel has it.
+    alone_with: tuple[str, ...] = ()
     # The flag comes with one that is compiled so, where all of these are raised by then.
     follows: tuple[str, ...] = ()
     # Whether a slider can raise it in another way: until its kernel is compiled, the scene's superset kernel has it.
@@ -362,6 +364,7 @@ _ROWS = (
     Flag(
         "HAS_FILM",
         lambda s: bool(filmed(s.materials).any()),
+        alone_with=_flags_of(with_optional("film_thickness")),
         evaluated_with=_flags_of(with_optional("film_thickness")),
         in_general=False,
     ),
@@ -385,13 +388,13 @@ _ROWS = (
     Flag(
         "HAS_THIN_WALLS",
         _thin_walls,
+        alone_with=("HAS_TRANSMISSION",),
         evaluated_with=_flags_of(TRANSMITTING),
-        previewed=_any_of(TRANSMITTING),
         in_general=False,
     ),
     # Rays to lights pass panes and boundaries of index 1.
-    Flag("HAS_STRAIGHT", _goes_straight, previewed=_any_of(TRANSMITTING), in_general=False),
-    Flag("HAS_DISPERSION", _disperses, previewed=_any_of(TRANSMITTING), in_general=False),
+    Flag("HAS_STRAIGHT", _goes_straight, alone_with=("HAS_TRANSMISSION",), in_general=False),
+    Flag("HAS_DISPERSION", _disperses, alone_with=("HAS_TRANSMISSION",), in_general=False),
     # They raise no code: `features.defines` asks for caustics where a setting does not forbid them.
     Flag("HAS_CAUSTICS", caustics.may_throw, previewed=_always, of_settings=True),
     Flag("HAS_SHARP_CAUSTICS", caustics.throws, previewed=_always, of_settings=True),

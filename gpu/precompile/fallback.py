@@ -1,8 +1,8 @@
 """Kernels that serve while a scene's own is compiled: a scene's superset kernel, and one for many scenes.
 
 The superset kernel of a scene has the numbers of its shapes and materials compiled in, as the scene's own has, and
-the flags on that a slider of the scene could raise. Its samples take 1.1 to 1.6 times as long as those of the own
-one, and it compiles in 1 to 3 s (llvmpipe, the built-in scenes).
+the flags on that a slider of the scene could raise, but for those of rare features. Its samples take 1.1 to 1.6 times
+as long as those of the own one, and it compiles in 2 to 4 s (llvmpipe, the built-in scenes).
 
 The kernel for many scenes has every flag on but those of features that it does not support, and reads the numbers of
 shapes from the uniforms. So its machine code depends on no scene, only on whether the sides of the environment's map

@@ -143,12 +143,13 @@ def test_references_are_found_where_they_may_stand() -> None:
     document = {
         "environment": {"type": "cubemap", "assets": {"px": "a", "nx": "b"}},
         "textures": {"asset": {"asset": "c"}},
-        "materials": {"assets": {"type": "a", "asset": "no"}},
+        "materials": {"assets": {"type": "a", "asset": "d"}},
         "shapes": [{"asset": "a"}, 3, {"asset": 4}],
     }
-    assert references.references(document) == ["a", "b", "c"]
+    assert references.references(document) == ["a", "b", "c", "d"]
     renamed = references.renamed(document, str.upper)
-    assert renamed["materials"] == document["materials"] and renamed["shapes"] == [{"asset": "A"}, 3, {"asset": 4}]
+    assert renamed["materials"] == {"assets": {"type": "a", "asset": "D"}}
+    assert renamed["shapes"] == [{"asset": "A"}, 3, {"asset": 4}]
     assert references.references("nonsense") == []
 
 

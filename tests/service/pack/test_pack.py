@@ -99,6 +99,7 @@ def test_every_number_of_a_material_has_its_place(model):
         "clearcoat_normal_map",
         "height",
         "thin_walled",
+        "abbe",  # see test_dispersion
     }
     if model == "microfacet":  # the rest has a record of its own
         own = {"emission", "diffuse", "f0", "ior"}
