@@ -195,7 +195,8 @@ class Config(BaseSettings):
         16_000_000,
         ge=1,
         le=2**24,
-        description="Most triangles that a scene holds, shared ones once; at most 2^24 (float32 counts no further).",
+        description="Most triangles that a scene holds, shared ones once, those of displaced meshes as they are cut; "
+        "at most 2^24 (float32 counts no further).",
     )
     max_shapes: int = Field(200_000, ge=1, description="Most shapes of a scene; a mesh is one.")
     max_lights: int = Field(10_000, ge=1, description="Most lights of a scene that are no shapes.")

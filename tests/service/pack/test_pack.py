@@ -79,6 +79,8 @@ MEMBERS = {
     ("openpbr", "fuzz_weight"): "sheen",
     ("openpbr", "fuzz_color"): "sheen_color",
     ("openpbr", "fuzz_roughness"): "sheen_roughness",
+    ("openpbr", "thin_film_weight"): "film_weight",
+    ("openpbr", "thin_film_ior"): "film_ior",
     ("openpbr", "geometry_opacity"): "opacity",
 }
 
@@ -103,8 +105,9 @@ def test_every_number_of_a_material_has_its_place(model):
     }
     if model == "microfacet":  # the rest has a record of its own
         own = {"emission", "diffuse", "f0", "ior"}
-    if model == "openpbr":  # its emission is a product, and its tangents become angles
-        own = {name for name in own if not name.startswith(("emission", "geometry"))} | {"geometry_opacity"}
+    if model == "openpbr":  # its emission is a product, its tangents become angles, its films are in micrometres
+        own = {name for name in own if not name.startswith(("emission", "geometry", "transmission_disp"))}
+        own = own - {"thin_film_thickness"} | {"geometry_opacity"}
     for i, name in enumerate(sorted(own)):
         coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name in (
             "sheen_color",
@@ -112,7 +115,7 @@ def test_every_number_of_a_material_has_its_place(model):
             "conductor_k",
             "diffuse_transmission_color",
         )
-        value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.0101 * i
+        value = [0.1, 0.2, 0.3] if coloured else (1.1 if name.endswith("ior") else 0.1) + 0.0101 * i
         other = {"conductor_eta": "conductor_k", "conductor_k": "conductor_eta"}.get(name)  # either needs the other
         material = {"type": model, **required, name: value} | ({other: 3} if other else {})
         record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
