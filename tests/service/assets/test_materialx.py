@@ -305,7 +305,8 @@ def test_a_mtlx_in_a_texture_set_wins_and_two_files_are_told_apart(store: AssetS
 
 
 def test_it_is_served_and_a_file_is_no_mesh(server: Server) -> None:
-    text = mtlx(surface("open_pbr_surface", value("base_color", [0.5, 0.25, 0.125]), value("transmission_scatter", [0.1, 0.1, 0.1])))
+    scatters = value("transmission_scatter", [0.1, 0.1, 0.1])
+    text = mtlx(surface("open_pbr_surface", value("base_color", [0.5, 0.25, 0.125]), scatters))
     answer = server.http.post("/v1/assets", content=text, headers={"content-type": "application/octet-stream"})
     assert answer.status_code == 201 and answer.json()["kind"] == "materials" and answer.json()["format"] == "mtlx"
     id = answer.json()["id"]
