@@ -1,5 +1,6 @@
 """From a scene to compiled kernels: the flags of the code that it needs, the shader text, the compiled result.
 
+flag            what is known of a flag
 flag_table      a row for each flag: what needs it, and which sliders raise it
 caustics        what paths of light begin with: lights, and targets that mirror or refract
 deltas          which materials are perfectly specular

@@ -10,7 +10,8 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
-from gpu.kernels.flag_table import ANYWHERE, FLAGS, SHAPES, beside, looped_count
+from gpu.kernels.flag import ANYWHERE, beside
+from gpu.kernels.flag_table import FLAGS, SHAPES, looped_count
 from gpu.layout import ShapeKind
 from gpu.layout.models import DELTA, TABULATED, TRANSMITTING
 from gpu.layout.pixel_layers import SPLAT_BYTES

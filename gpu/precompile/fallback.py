@@ -21,7 +21,8 @@ from gpu.arrays import SceneArrays
 from gpu.device.scene import Scene
 from gpu.device.uploads import SharedUploads
 from gpu.kernels import features
-from gpu.kernels.flag_table import FLAGS, beside
+from gpu.kernels.flag import beside
+from gpu.kernels.flag_table import FLAGS
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
 

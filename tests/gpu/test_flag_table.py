@@ -10,7 +10,8 @@ import pytest
 from gpu import KernelKey, RenderSettings, SceneArrays
 from gpu.bsdf.kernels import ENTRIES
 from gpu.kernels import features
-from gpu.kernels.flag_table import ANYWHERE, FLAGS, Flag
+from gpu.kernels.flag import ANYWHERE, Flag
+from gpu.kernels.flag_table import FLAGS
 from gpu.layout.models import FLAGGED
 from gpu.precompile import fallback, kernel_keys
 from service.pack import pack, pack_material

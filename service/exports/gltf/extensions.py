@@ -195,8 +195,8 @@ def _iridescence(of: MaterialWriter) -> Tree:
     thickness = m.film_thickness
     if isinstance(thickness, ScalarTexture):
         if thickness.factor > 0:
-            plane = of.textures.plane(thickness, 1, of.at("film_thickness"))
-            if (info := of.textures.info((None, plane, None, None), is_srgb=False)) is not None:
+            green = of.textures.plane(thickness, 1, of.at("film_thickness"))
+            if (info := of.textures.info((None, green, None, None), is_srgb=False)) is not None:
                 found = {"iridescenceThicknessMinimum": 0.0, "iridescenceThicknessTexture": info}
         thickness = thickness.factor
     if thickness == 0:
