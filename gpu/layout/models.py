@@ -72,10 +72,17 @@ _LAYERS = ("subsurface", "sheen", "anisotropic", "clearcoat")
 # The first has no flag: it is in every kernel. Kernels ask for the others in this order.
 MODELS = (
     Model("diffuse", 0, (Lobe.DIFFUSE,)),
-    Model("disney", 1, (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT), has_terms=True, optional=_LAYERS),
-    Model("metal_rough", 3, _PLAIN, has_terms=True),
-    Model("blinn_phong", 4, _PLAIN, optional=("ambient",)),
-    Model("phong", 6, _PLAIN, optional=("ambient",)),
+    Model(
+        "disney",
+        1,
+        (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT),
+        has_terms=True,
+        optional=_LAYERS,
+        in_general=False,
+    ),
+    Model("metal_rough", 3, _PLAIN, has_terms=True, in_general=False),
+    Model("blinn_phong", 4, _PLAIN, optional=("ambient",), in_general=False),
+    Model("phong", 6, _PLAIN, optional=("ambient",), in_general=False),
     Model(
         "microfacet",
         5,

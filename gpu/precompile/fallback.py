@@ -4,9 +4,10 @@ The superset kernel of a scene has the numbers of its shapes and materials compi
 the flags on that a slider of the scene could raise, but for those of rare features. Its samples take 1.1 to 1.6 times
 as long as those of the own one, and it compiles in 2 to 4 s (llvmpipe, the built-in scenes).
 
-The kernel for many scenes has every flag on but those of features that it does not support, and reads the numbers of
-shapes from the uniforms. So its machine code depends on no scene, only on whether the sides of the environment's map
-are powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to compile.
+The kernel for many scenes has every flag on but those of features that are rare or would cost too much, and reads the
+numbers of shapes from the uniforms. So its machine code depends on no scene, only on whether the sides of the
+environment's map are powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to
+compile.
 """
 
 from __future__ import annotations
