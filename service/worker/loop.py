@@ -92,7 +92,7 @@ class Loop:
     def run(self) -> None:
         """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
         busy = False
-        self._compiler.prepare(kernel_keys.common_keys(), "spare")
+        self._compiler.prepare(kernel_keys.common_keys(), "soon")
         while True:
             for message in coalesced(self._pending(wait=not busy)):
                 self.handlers[type(message)](message)

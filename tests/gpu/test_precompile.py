@@ -20,7 +20,7 @@ from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.renderers.local.supervisor import Supervisor
 from service.worker.device.loaded_scene import LoadedScene, edited_scene, kernel_request
-from service.worker.helpers.compile_client import CompileClient, Compiled, Priority, records
+from service.worker.helpers.compile_client import SPARE_AFTER_S, CompileClient, Compiled, Priority, records
 from service.worker.helpers.compile_main import LOCKS
 from tests.serving import PATIENCE_S, wait_until
 from tests.supervisors import LINEAR, SCENES, SIZE, Ears, compile_helpers, with_supervisor
@@ -208,13 +208,24 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     """What pictures are shown with, and what the noise meter and `adaptive` ask."""
     asked = []
     for _ in range(2):
-        compiler, helper = compiling_instantly(gpu, "spare")
-        compiler.prepare(common_keys(), "spare")
+        compiler, helper = compiling_instantly(gpu, "soon")
+        compiler.prepare(common_keys(), "soon")
         while compiler.left_s is not None:
             compiler.hear()
         assert all(compiler.has(key) for key in common_keys())
         asked.append(helper.asked)
     assert asked == [common_keys(), []] and len(common_keys()) == 17
+
+
+def test_what_may_be_needed_some_time_waits_for_the_first_minute(gpu: Renderer, cold: Path) -> None:
+    compiler, helper = compiling_instantly(gpu, "spare")
+    compiler.prepare(common_keys()[:1], "spare")
+    compiler.hear()
+    assert helper.asked == [] and not compiler.is_idle("spare")
+    assert compiler.left_s == pytest.approx(SPARE_AFTER_S, abs=30)
+    compiler._lanes["spare"].begins = 0.0
+    compiler.hear()
+    assert helper.asked == common_keys()[:1]
 
 
 def test_what_a_newer_scene_needs_takes_the_place_of_the_older_one_s(gpu: Renderer, cold: Path) -> None:
@@ -235,6 +246,7 @@ def test_what_somebody_waits_for_stands_behind_nothing_foreseen(gpu: Renderer, c
     foreseen: dict[Priority, Instant] = {"soon": Instant(), "spare": Instant()}
     for priority, helper in foreseen.items():
         compiler._lanes[priority].helper = helper  # type: ignore[assignment]
+    compiler._lanes["spare"].begins = 0.0
     keys, ended = common_keys(), list[float]()
     compiler.prepare(keys[:3], "spare")
     compiler.prepare(keys[3:5], "soon")

@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 TRIES = 3  # failures in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
 SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
+# What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then.
+# A kernel can take a minute, and is compiled from its beginning again where the renderer ends first.
+SPARE_AFTER_S = 60.0
 REMEMBERED = 256  # kernels in memory; records on the disk tell of the others
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
 
 # now: somebody waits; soon: somebody may in some seconds, and tracing goes on a little slower meanwhile; spare: in
-# time that nobody else wants, however long that takes
+# time that nobody else wants, after the first minute, however long that takes
 Priority = Literal["now", "soon", "spare"]
 
 Done = Callable[[float], None]  # called with the milliseconds that a kernel took
@@ -51,6 +54,7 @@ class _Lane:
 
     helper: HelperProcess
     limit_s: float
+    begins: float = 0.0  # by the monotonic clock: nothing is compiled before
     wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # whom to call, and the client of each
     key: KernelKey | None = None  # the one under way
     until: float = 0.0  # by the monotonic clock: when it takes too long
@@ -61,8 +65,15 @@ class _Lane:
 
     @property
     def left_s(self) -> float | None:
-        """How many more seconds a wait for the kernel under way makes sense; None: there is none."""
-        return None if self.key is None else max(0.0, self.until - time.monotonic())
+        """How many more seconds a wait makes sense for the kernel under way, or for the first one; None: for none."""
+        if self.key is None and not self.wanted:
+            return None
+        return max(0.0, (self.begins if self.key is None else self.until) - time.monotonic())
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the next kernel can be begun."""
+        return self.key is None and bool(self.wanted) and time.monotonic() >= self.begins
 
     def forget(self, done: Done) -> None:
         for key, callers in list(self.wanted.items()):
@@ -114,6 +125,7 @@ class CompileClient:
             line = lifeline if each == "now" else None
             helper = HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line)
             self._lanes[each] = _Lane(helper, LIMIT_S if each == "now" else SPARE_LIMIT_S)
+        self._lanes["spare"].begins = time.monotonic() + SPARE_AFTER_S
 
     @property
     def ends(self) -> list[socket.socket]:
@@ -126,7 +138,7 @@ class CompileClient:
         return min((left for lane in self._lanes.values() if (left := lane.left_s) is not None), default=None)
 
     def is_idle(self, priority: Priority) -> bool:
-        return self._lanes[priority].key is None
+        return not self._lanes[priority].wanted
 
     def knows(self, key: KernelKey) -> bool:
         """Whether nobody needs to wait for this kernel any more."""
@@ -191,7 +203,7 @@ class CompileClient:
             lane.wanted[key][done] = client
         elif self._able:
             lane.wanted[key] = {done: client}
-            if lane.key is None:
+            if lane.is_due:
                 self._begin(lane)
         return key in lane.wanted
 
@@ -248,7 +260,7 @@ class CompileClient:
             if answer.cached and not answer.detail:
                 self._record(lane.key)
             self._end(lane, lane.key, answer.milliseconds)
-        if lane.key is None and lane.wanted:
+        if lane.is_due:
             self._begin(lane)
 
     def _give_up(self, lane: _Lane, detail: str) -> None:
