@@ -1,5 +1,5 @@
-// Entry: traces paths of light, one for each pixel of a tile in each of the samples [sample_first, sample_first +
-// sample_count), and adds what they bring to whichever pixels see it.
+// Entry: traces paths of light, one for each pixel of a tile in those of the samples [sample_first, sample_first +
+// sample_count) that have some (gpu/picture/light_paths.py), and adds what they bring to whichever pixels see it.
 #include "layout.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_COUNTERS) buffer counter_buffer {
@@ -29,8 +29,11 @@ void main() {
     uint i = 0u;
     do {
         uint index = uniforms.sample_first + i;
-        light_path_trace(medium, light_path_sampler(pixel, index), (index & 1u) != 0u);
-        if (!budget_lasts()) atomicAdd(path_cut, 1u);
+        uint part = index % LIGHT_PERIOD;
+        if (part < 2u) {
+            light_path_trace(medium, light_path_sampler(pixel, index / LIGHT_PERIOD, part), part != 0u);
+            if (!budget_lasts()) atomicAdd(path_cut, 1u);
+        }
     } while (++i < uniforms.sample_count);
 #endif
 }

@@ -1,8 +1,10 @@
-"""Caustics by paths of light: each sample of a picture has as many of them as pixels, traced after its paths from the
-camera. What they bring is summed in integers, so that the picture has the same bits however its work was cut.
+"""Caustics by paths of light: the first two of every LIGHT_PERIOD samples have as many of them as the picture has
+pixels, traced after the paths from the camera. What they bring is summed in integers, so that the picture has the
+same bits however its work was cut.
 
-The paths of even samples and of odd ones have independent random numbers. The square of the difference of what both
-bring is therefore an unbiased estimate of the variance of their sum, whatever the sampler gains.
+The paths of the first of these samples and those of the second ones have independent random numbers. The square of
+the difference of what both bring is therefore an unbiased estimate of the variance of their sum, whatever the sampler
+gains.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu.kernels import caustics
 from gpu.kernels.cache import KernelCache
-from gpu.kernels.features import MOST_SPLATTED, SPLAT_UNITS
+from gpu.kernels.features import LIGHT_PERIOD, MOST_SPLATTED, SPLAT_UNITS
 from gpu.layout import LUMINANCE
 from gpu.layout.bindings import Slot
 from gpu.layout.pixel_layers import SPLAT_BYTES
@@ -30,6 +32,11 @@ _SMOOTHED = 2  # pixels on each side over which an estimate of variance, from on
 def reversed_rays(defines: dict[str, object]) -> dict[str, object]:
     """The defines that lighttrace.comp is compiled with, from those of a picture's other kernels."""
     return defines | {"REVERSED": 1}
+
+
+def samples_with_paths(samples: int) -> tuple[int, int]:
+    """How many of the first samples have even paths of light, and how many have odd ones."""
+    return (samples + LIGHT_PERIOD - 1) // LIGHT_PERIOD, (samples + LIGHT_PERIOD - 2) // LIGHT_PERIOD
 
 
 class LightPaths:
@@ -108,7 +115,7 @@ class LightPaths:
 
     def trace(self, tile: Tile, first: int, samples: int) -> None:
         """Start the paths of the pixels of a tile in some samples; the caller waits for it."""
-        if self._begins:
+        if self._begins and samples_with_paths(first + samples) != samples_with_paths(first):
             self._start(tile, first, samples, work_groups(tile[2], tile[3]))
 
     def _start(self, tile: Tile, first: int, samples: int, groups: tuple[int, int]) -> None:

@@ -18,7 +18,7 @@ from gpu.picture.accumulators import Accumulators
 from gpu.picture.adaptive import Adaptive
 from gpu.picture.bands import BandTracer
 from gpu.picture.dispatcher import Dispatcher
-from gpu.picture.light_paths import LightPaths
+from gpu.picture.light_paths import LightPaths, samples_with_paths
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
 from gpu.picture.tiles import MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
@@ -234,9 +234,9 @@ class Passes:
         part = 0
         if self._light.on and samples and row >= 0:
             part = pixels if row >= self._light_rows else self._light_tiles.pixels_before(row, self._column)
-        odd = (first + samples) // 2 - first // 2  # of the pass under way
-        self._light.odd = pixels * (first // 2) + part * odd
-        self._light.even = pixels * (first - first // 2) + part * (samples - odd)
+        (even, odd), (evens, odds) = samples_with_paths(first), samples_with_paths(first + samples)
+        self._light.even = pixels * even + part * (evens - even)
+        self._light.odd = pixels * odd + part * (odds - odd)
 
     def _trace_light(self, row: int) -> None:
         tiles, samples = self._light_tiles, self._pass_samples

@@ -2,8 +2,8 @@
 // order does not matter: a picture has the same bits however its work was cut.
 
 #if CAUSTICS
-// For each pixel the two words of four numbers, the low ones first: red, green, blue, and the luminance of the even samples less
-// that of the odd ones, whose square says how far the two are apart.
+// For each pixel the two words of four numbers, the low ones first: red, green, blue, and the luminance of the first samples of
+// periods less that of the second ones, whose square says how far the two are apart.
 layout(std430, binding = SLOT_SPLATS) buffer splat_buffer { uint splat_words[]; };
 
 const float SPLAT_WORD = 4294967296.0;

@@ -110,14 +110,14 @@ void light_path_trace(Medium camera_medium, Sampler rng, bool odd) {
     } while (path.alive);
 }
 
-// The random numbers of a pixel's path of light in the sample `index`. All paths of the picture share one sequence, as
-// any of them may come to any pixel; the even samples and the odd ones have one each, which are independent.
-Sampler light_path_sampler(uvec2 pixel, uint index) {
+// The random numbers of a pixel's path of light in the first or the second sample (`part`) of a period. All paths of the
+// picture share one sequence, as any of them may come to any pixel; the two parts have one each, which are independent.
+Sampler light_path_sampler(uvec2 pixel, uint period, uint part) {
     uint pixels = uniforms.resolution.x * uniforms.resolution.y, high, low;
-    umulExtended(index >> 1u, pixels, high, low);
+    umulExtended(period, pixels, high, low);
     uint place = low + pixel.y * uniforms.resolution.x + pixel.x;
     if (place < low) high++;
-    Sampler rng = sobol_begin(uvec2(high, 0u), place, 0x6c696768u + (index & 1u));
+    Sampler rng = sobol_begin(uvec2(high, 0u), place, 0x6c696768u + part);
 #if SAMPLER == 0 && !ADAPTIVE
     rng.shift = uvec2(0u);
     rng.quad = 0u;

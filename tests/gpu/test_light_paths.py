@@ -12,6 +12,7 @@ from gpu import Band, Picture, Renderer, RenderSettings
 from gpu.kernels import features
 from gpu.kernels.caustics import MOST_TARGETS, sources, targets
 from gpu.kernels.deltas import may_be_specular
+from gpu.picture.light_paths import samples_with_paths
 from service.pack import pack
 from service.scene import parse_scene
 from tests.gpu.bits import assert_same, beside, saved
@@ -64,7 +65,9 @@ def test_a_picture_that_was_saved_between_its_paths_of_light(made: Callable[[int
     while not (first.samples > 8 and first.under_way[1] >= 37):
         first.trace(0.0, 40)
     counted = first._light.even + first._light.odd
-    assert 48 * 37 * first.samples <= counted < 48 * 37 * (first.samples + first.under_way[0])
+    ends = first.samples, first.samples + first.under_way[0]
+    before, after = (48 * 37 * sum(samples_with_paths(end)) for end in ends)
+    assert before <= counted < after
     kept = saved(first)
     second = beside(first)
     assert second.fits(kept)
@@ -75,13 +78,14 @@ def test_a_picture_that_was_saved_between_its_paths_of_light(made: Callable[[int
     assert_same(second, whole)
 
 
-def test_a_picture_is_right_before_a_pass_is_complete(made: Callable[[int], Picture]) -> None:
+def test_a_picture_is_right_before_a_pass_is_complete(gpu: Renderer) -> None:
     """The sums are divided by the number of paths that they have, whether or not all pixels have theirs."""
-    under_way, whole = made(16), made(16)
-    rows = 37 + 37 // 2
-    while not rows <= under_way.under_way[1] < 74:
+    large = SETTINGS | {"width": 192, "height": 148}
+    under_way, whole = (picture(gpu, scene(), 16, caustics="light", **large) for _ in range(2))
+    while not 148 + 74 <= under_way.under_way[1] < 296:
+        assert under_way.samples == 16
         under_way.trace(0.0, 24)
-    brought, expected = (p._light.radiance(0, 48 * 37).mean() for p in (under_way, whole))
+    brought, expected = (p._light.radiance(0, 192 * 148).mean() for p in (under_way, whole))
     assert brought == pytest.approx(expected, rel=0.02)
 
 
@@ -89,7 +93,7 @@ def test_the_estimated_error_is_that_of_independent_pictures(gpu: Renderer) -> N
     """The mean of the estimates over 12 seeds, beside the variance between what their paths of light bring."""
     light, estimates = [], []
     for seed in range(12):
-        one = picture(gpu, scene(), 6, caustics="light", seed=seed, **SETTINGS)
+        one = picture(gpu, scene(), 24, caustics="light", seed=seed, **SETTINGS)
         luminance, squared = one._light.squared_error()
         light.append(luminance)
         estimates.append(squared.mean())

@@ -134,7 +134,7 @@ def light_tracer(light: dict[str, Any], bounces: int, count: int = 400_000) -> f
 @pytest.mark.parametrize("bounces", [3, 8])
 def test_totals_are_those_of_a_light_tracer(gpu: Renderer, name: str, bounces: int) -> None:
     """Within 2 %. With three bounces no light comes to the floor that was mirrored inside of the ball."""
-    made = picture(gpu, scene(LAMPS[name]), 16, caustics="light", width=48, height=48, max_bounces=bounces)
+    made = picture(gpu, scene(LAMPS[name]), 64, caustics="light", width=48, height=48, max_bounces=bounces)
     expected = light_tracer(LAMPS[name], bounces)
     assert expected > 0.01
     assert caustic(made).mean() == pytest.approx(expected, rel=0.02)
