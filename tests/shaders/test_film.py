@@ -158,6 +158,18 @@ def test_white_under_a_film_loses_little_and_never_gains(prober: Prober, base: s
         assert under[low] > 0.98, (under[low], error[low], m[low], asks[low])
 
 
+def test_thick_films_on_white_gain_nothing_from_their_ripples(prober: Prober) -> None:
+    """Up to a roughness of .3. Means over rougher facets know four cosines: up to 1.3 % comes back too much there."""
+    grid = np.meshgrid([1000, 1200, 1400, 1600], [1.12, 1.33], [0, 0.2, 0.3], np.linspace(0.1, 1, 6), indexing="ij")
+    thickness, ior, roughness, cosines = (a.ravel() for a in grid)
+    m = np.repeat(materials(model=NUMBERS["principled"], base_color=1), len(cosines))
+    m["film_thickness"], m["film_ior"], m["roughness"] = thickness, ior, roughness
+    asks = np.zeros((len(m), 4), np.float32)
+    asks[:, 0] = cosines
+    albedo, error = _albedo(prober, m, asks, 1 << 13)
+    assert (albedo - 4 * error).max() < 1.003 and (albedo + 4 * error).min() > 0.98
+
+
 def test_a_film_on_dispersive_glass_keeps_the_furnace(gpu: Renderer) -> None:
     """A filmed ball of flint glass is not seen in a white world, whichever channel leads."""
     glass = {"type": "principled", "transmission": 1, "base_color": 1, "roughness": 0, "ior": 1.7, "abbe": 20}

@@ -11,6 +11,8 @@ BASE_SHARE shares_clear(Surface s) { return multiscatter_fresnel(base_dielectric
 const float FACETS_OF_ONE = 0.0, FACETS_OF_ALL = 2.0, FACETS_MET = 4.0;
 // Up to this roughness the loss is that of bare facets: so little that its change is within the error of the tables.
 const float SHARES_SMOOTH = 0.3;
+// Directions of equal weight for the mean over smooth films: films of 10 micrometres in water still ripple more.
+const int SHARES_RIPPLES = 12;
 // The part of a change of the loss that is left out, so that nothing is put back twice.
 const float SHARES_MARGIN = 0.05;
 
@@ -28,6 +30,20 @@ vec3 shares_mean(Surface s, float c, float eta, float rule, out float bare) {
         bare += weights[i] * base_bare(s, cosines[i], eta);
     }
     return gain;
+}
+
+// The cosine-weighted mean over all directions of what a film adds. Thick films ripple with the angle more than four
+// cosines show, and rough facets less than smooth ones.
+vec3 shares_mean_gain(Surface s) {
+    float bare, rough = s.is_delta ? 0.0 : clamp((s.roughness - SHARES_SMOOTH) / SHARES_SMOOTH, 0.0, 1.0);
+    vec3 ripples = vec3(0.0), facets = vec3(0.0);
+    if (rough < 1.0) {
+        for (int i = 0; i < SHARES_RIPPLES; i++) {
+            ripples += shares_gain(s, sqrt((float(i) + 0.5) / float(SHARES_RIPPLES)), s.eta_outside);
+        }
+    }
+    if (rough > 0.0) facets = shares_mean(s, 0.0, s.eta_outside, FACETS_OF_ALL, bare);
+    return mix(ripples / float(SHARES_RIPPLES), facets, rough);
 }
 
 // The loss between the facets of glass, of which `albedo` has that of bare ones: light that a facet reflects because of
@@ -116,7 +132,6 @@ void shares_face(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
 #if HAS_FILM
     s.film_cosine = wo.z;
     if (s.film > 0.0) {
-        float bare;
         s.film_mean = vec3(mix(fresnel_mean(s.eta_outside), 1.0, s.excess));
         s.film_metal_mean = vec3(0.0);
         for (int i = 0; i < 4; i++) {
@@ -125,8 +140,8 @@ void shares_face(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
         }
         s.film_once = shares_once(s, wo, albedo);
         s.film_kept = shares_kept(s, wo, albedo);
-        vec3 gain = shares_mean(s, 0.0, s.eta_outside, FACETS_OF_ALL, bare);
-        s.film_kept_mean = clamp(multiscatter_albedo(albedo_mean, shares_clear(s)) + albedo_mean.x * gain, 0.0, 1.0);
+        vec3 kept = multiscatter_albedo(albedo_mean, shares_clear(s)) + albedo_mean.x * shares_mean_gain(s);
+        s.film_kept_mean = clamp(kept, 0.0, 1.0);
 #if HAS_TRANSMISSION
         s.film_lost = shares_lost(s, wo.z, albedo, s.inside, FACETS_OF_ONE);
         s.film_lost_outside = shares_lost(s, 0.0, albedo_mean, false, FACETS_OF_ALL);
