@@ -78,7 +78,6 @@ MODELS = (
         (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT),
         has_terms=True,
         optional=_LAYERS,
-        in_general=False,
     ),
     Model("metal_rough", 3, _PLAIN, has_terms=True, in_general=False),
     Model("blinn_phong", 4, _PLAIN, optional=("ambient",), in_general=False),
