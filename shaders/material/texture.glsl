@@ -232,6 +232,13 @@ Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS
     return m;
 }
 
+// Likewise, with texels of the point alone.
+Material texture_material(SurfacePoint at) {
+    vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
+    texture_look(at, footprint_none(), texels);
+    return texture_material(at, texels);
+}
+
 // The chance that a ray meets the surface at the point. An alpha cutoff is compared with the filtered texel.
 float texture_opacity(SurfacePoint at) {
     Material m = material_pick(at.material);
@@ -323,4 +330,6 @@ bool texture_coat_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS,
     return mapped;
 }
 #endif
+#else
+Material texture_material(SurfacePoint at) { return material_pick(at.material); }
 #endif

@@ -100,6 +100,23 @@ Surface interaction_surface(Interaction here, Material m) {
     return s;
 }
 
+#if HAS_STRAIGHT || HAS_LAYERED_LIGHTS
+// The surface at a point that no path has come to, seen along w without normal maps. Of `here` it fills in what lobes ask
+// for: wo, behind, basis and tangent.
+Surface interaction_lone(SurfacePoint at, vec3 w, out Interaction here, out Material m) {
+    here.behind = dot(at.ng, w) < 0.0;
+    here.basis = basis_make(sides_normal(at, w));
+    here.wo = basis_to_local(here.basis, w);
+    m = texture_material(at);
+    interaction_tangent(at, m, here);
+    Surface s = surface_make(m, here.tangent);
+#if HAS_COAT_NORMALS
+    s.coat = basis_make(vec3(0.0, 0.0, 1.0));
+#endif
+    return s;
+}
+#endif
+
 // The medium on the other side of the surface where `crosses`, else that on this side.
 Medium interaction_medium(bool crosses, Medium near, Medium beyond) {
     Medium medium = near;

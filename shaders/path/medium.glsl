@@ -55,13 +55,7 @@ Medium medium_at(vec3 from) {
         Hit hit = shapes_nearest(o, d, skip);
         SurfacePoint at = shapes_point(hit, o, d);
         more = hit.id != NONE && layer < MEDIUM_LAYERS && budget_lasts();
-#if HAS_TEXTURES
-        vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-        texture_look(at, footprint_none(), texels);
-        Material m = texture_material(at, texels);
-#else
-        Material m = material_pick(at.material);
-#endif
+        Material m = texture_material(at);
         bool counts = more && material_transmits(m) && !material_is_thin(m);
 #if HAS_HIDDEN_SHAPES
         counts = counts && (at.shape & HIDDEN) == 0u;

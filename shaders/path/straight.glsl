@@ -48,21 +48,9 @@ bool straight_goes(Surface s, SurfacePoint at) {
 // finds there: its surface is that of interaction_surface, and bsdf_deltas gives the share.
 vec3 straight_share(SurfacePoint at, vec3 d, inout Medium medium) {
     Interaction here;
-    here.behind = dot(at.ng, -d) < 0.0;
-    here.basis = basis_make(sides_normal(at, -d));
-#if HAS_TEXTURES
-    vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-    texture_look(at, footprint_none(), texels);
-    Material m = texture_material(at, texels);
-#else
-    Material m = material_pick(at.material);
-#endif
-    interaction_tangent(at, m, here);
-    Surface s = surface_make(m, here.tangent);
-#if HAS_COAT_NORMALS
-    s.coat = basis_make(vec3(0.0, 0.0, 1.0));
-#endif
-    vec3 share = models_straight(basis_to_local(here.basis, -d), here.behind, s);
+    Material m;
+    Surface s = interaction_lone(at, -d, here, m);
+    vec3 share = models_straight(here.wo, here.behind, s);
 #if HAS_ATTENUATION
     if (!material_is_thin(m)) {
         vec3 rate = surface_attenuation(m);
