@@ -94,7 +94,8 @@ class BsdfEvaluator:
         Raises CompileError, OutOfMemory.
         """
         n, m = len(wo), 1 if paired else len(wi)
-        alone = models.BY_NUMBER[int(material.materials["model"][0])].lobes if lobes else ()
+        model = models.BY_NUMBER[int(material.materials["model"][0])]
+        alone, names = (model.lobes, model.lobe_names) if lobes else ((), ())
         found = []
         work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
         try:
@@ -109,10 +110,15 @@ class BsdfEvaluator:
         finally:
             work.release()
         whole, *parts = found
-        names = np.array([lobe.name.lower() for lobe in alone], np.str_)
         shown = np.stack([part[..., :3] for part in parts]) if parts else np.zeros((0, n, m, 3), np.float32)
         return BsdfValues(
-            whole[..., :3], whole[..., 3], wi_[..., :3], weight[..., :3], wi_[..., 3], lobes=shown, lobe_names=names
+            whole[..., :3],
+            whole[..., 3],
+            wi_[..., :3],
+            weight[..., :3],
+            wi_[..., 3],
+            lobes=shown,
+            lobe_names=np.array(names, np.str_),
         )
 
     def albedo(

@@ -52,12 +52,19 @@ class Model:
     # What it has besides `layout.Material`, and the member of `SceneArrays` that begins with one for each material.
     record: type[Record] | None = None
     records: str = ""
+    words: tuple[tuple[Lobe, str], ...] = ()  # what it calls lobes that have another name elsewhere
     in_general: bool = True  # the kernel for many scenes has it; a rare one would cost all other scenes time
 
     @property
     def flag(self) -> str:
         """The flag of kernels that know the model."""
         return f"HAS_{self.name.upper()}"
+
+    @property
+    def lobe_names(self) -> tuple[str, ...]:
+        """What the model calls its lobes."""
+        words = dict(self.words)
+        return tuple(words.get(lobe, lobe.name.lower()) for lobe in self.lobes)
 
     @property
     def lobes_flag(self) -> str:
@@ -128,6 +135,7 @@ MODELS = (
         covers_emission=True,
         has_members=True,
         optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness", "film_thickness"),
+        words=((Lobe.SHEEN, "fuzz"), (Lobe.CLEARCOAT, "coat")),
         in_general=False,
     ),
 )

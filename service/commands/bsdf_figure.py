@@ -26,7 +26,9 @@ LOBES = {
     "specular": "#0b7a99",
     "multiscatter": "#7a5195",
     "sheen": "#b0447a",
+    "fuzz": "#b0447a",
     "clearcoat": "#4c7a1f",
+    "coat": "#4c7a1f",
     "transmission": "#3a55c4",
 }
 STYLES = ("-", "--")  # line styles of the first and the second material

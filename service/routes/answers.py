@@ -191,7 +191,10 @@ class SpecularLobe(BaseModel):
 
 
 class BsdfLobe(BaseModel):
-    name: str = Field(description="`diffuse`, `specular`, `multiscatter`, `sheen`, `clearcoat` or `transmission`.")
+    name: str = Field(
+        description="`diffuse`, `specular`, `multiscatter`, `sheen`, `clearcoat` or `transmission`; the layers of "
+        "`openpbr` are `fuzz` and `coat`."
+    )
     f: list[list[list[float]]] = Field(description="Its part of `f`; 0 where the material's numbers turn it off.")
 
 

@@ -149,7 +149,8 @@ def test_variant_b_becomes_openpbr_with_its_groups_and_lobes(editor: Editor) -> 
     done = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"
     editor.wait("the plot", lambda: page.evaluate(done))
     page.check("#lobe >> label:has-text('By lobe') >> input")
-    wanted = {"A, Principled", "B, OpenPBR", "diffuse", "specular", "multiscatter", "sheen", "clearcoat"}
+    layers = {"sheen", "clearcoat", "fuzz", "coat"}
+    wanted = {"A, Principled", "B, OpenPBR", "diffuse", "specular", "multiscatter", *layers}
     editor.wait("its lobes", lambda: set(page.inner_text("#lobe .lobe-legend").split("\n")) == wanted)
     editor.wait("the other models, of which kernels are compiled ahead", lambda: "microfacet" in turned)
     assert "measured" not in turned, "that is of a file"
