@@ -65,13 +65,14 @@ class Failures:
     """Names each failed test as soon as it has failed: a run that is stopped for its length has no summary."""
 
     def __init__(self, config: pytest.Config) -> None:
-        self.terminal = config.pluginmanager.get_plugin("terminalreporter")
+        self.config = config
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.failed and self.terminal is not None:
+        terminal = self.config.pluginmanager.get_plugin("terminalreporter")
+        if report.failed and terminal is not None:
             crash = getattr(report.longrepr, "reprcrash", None)
             why = f" - {crash.message.splitlines()[0]}" if crash and crash.message else ""
-            self.terminal.write_line(f"\nFAILED {report.nodeid} [{report.when}, {report.duration:.0f} s]{why}"[:300])
+            terminal.write_line(f"\nFAILED {report.nodeid} [{report.when}, {report.duration:.0f} s]{why}"[:300])
 
 
 @pytest.fixture(scope="module", autouse=True)
