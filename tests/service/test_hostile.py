@@ -40,7 +40,7 @@ CHECKS = [
     checks.response_schema_conformance,
     checks.response_headers_conformance,
 ]
-PATIENCE_S = float(os.environ.get("HOSTILE_PATIENCE", 60))  # a later answer counts as none
+PATIENCE_S = float(os.environ.get("HOSTILE_PATIENCE", 180))  # a later answer counts as none
 AT_ONCE = 8
 GROWTH = 150 << 20  # bytes: allocators, kernels and parsed assets, each of which has its bound
 SMALL = {"width": 8, "height": 8, "max_samples": 2}
