@@ -39,6 +39,7 @@ from gpu.layout.pixel_layers import ACCUMULATOR_BYTES
 from gpu.picture.blocks import Band, border_after, stop_after
 from gpu.picture.look import Lut, ViewTable
 from gpu.picture.picture import Picture
+from gpu.picture.prior import Prior, can_move, prior_bytes
 from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
 from gpu.renderer import Renderer
@@ -69,6 +70,7 @@ __all__ = [
     "NothingRendered",
     "OutOfMemory",
     "Picture",
+    "Prior",
     "RenderSettings",
     "Renderer",
     "Saved",
@@ -81,8 +83,10 @@ __all__ = [
     "ViewTable",
     "WrongThread",
     "border_after",
+    "can_move",
     "devices",
     "picture_bytes",
+    "prior_bytes",
     "scene_bytes",
     "software_device",
     "stop_after",

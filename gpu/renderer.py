@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
@@ -17,6 +19,7 @@ from gpu.errors import SceneTooLarge, WrongThread
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS
 from gpu.picture.picture import Picture
+from gpu.picture.prior import Prior
 from gpu.precompile.fallback import FallbackScene
 from gpu.settings import RenderSettings
 
@@ -74,6 +77,15 @@ class Renderer:
         """
         self._own()
         return Picture(self.context, self._kernels, self._uniform_buffer, scene, settings)
+
+    def prior(self, color: np.ndarray, camera: np.void, depth: np.ndarray | None = None) -> Prior:
+        """What a picture shows, (height, width, 4) linear float32 as `Picture.read` gives it, as a prior for pictures
+        that edits of its scene lead to. With its `depth`, (height, width, 1), the camera may move.
+
+        Raises OutOfMemory.
+        """
+        self._own()
+        return Prior(self.context, self._kernels, color, camera, depth)
 
     @property
     def bsdf(self) -> BsdfEvaluator:

@@ -40,6 +40,11 @@ class Slot(IntEnum):
     METER_PLACES = 14
     # resolve.comp: tables of displays and looks
     TABLES = 13
+    # prior.comp, prior_warp.comp
+    BEFORE = 13
+    CHANGE = 14
+    AFTER = 15
+    DEPTHS = 14
 
 
 class BlockSlot(IntEnum):

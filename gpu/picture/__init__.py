@@ -15,6 +15,7 @@ noise_meter   a picture's error, from a second, independent estimate of a share 
 readout       a picture's mean, variance, noise and first hits, read from the accumulators
 dispatcher    runs kernels over parts of a picture
 first_hit     AOVs of the first hit
+prior         what a picture showed before an edit, as a guess at what it shows afterwards
 look          exposure, tone map, primaries and tables of a picture that is shown
 coverage      how much of each pixel a shape or a material covers
 resolve       accumulators to display values, on the device

@@ -118,9 +118,11 @@ class Accumulators:
         block = self.block if self.open else None
         bind(kernel, self.total, block, self._zero, first, count, self.moment_scale)
 
-    def bind_alone(self, total: dict[Slot, Any], kernel: Any, first: int, count: int) -> None:
-        """Bind other sums in their place, given as SUM and MOMENTS."""
-        bind(kernel, total, None, self._zero, first, count, self.moment_scale)
+    def bind_alone(
+        self, total: dict[Slot, Any], beside: dict[Slot, Any] | None, kernel: Any, first: int, count: int
+    ) -> None:
+        """Bind other sums in their place, given as SUM and MOMENTS, and perhaps some that are added to them."""
+        bind(kernel, total, beside, self._zero, first, count, self.moment_scale)
 
     def means(self, first: int, count: int) -> np.ndarray:
         """Mean radiance and alpha of pixels [first, first + count): (count, 4) float32, as `accumulators_sum`
@@ -193,7 +195,7 @@ def bind(
     """Bind pixels [first, first + count) for a kernel that includes `accumulate/accumulators.glsl`; `zero` where
     there is no buffer."""
     for slot in ACCUMULATORS:
-        places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block[slot])
+        places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block.get(slot))
         for place, buffer in places:
             if buffer is None:
                 zero.bind_to_storage_buffer(place)

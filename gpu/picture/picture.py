@@ -21,6 +21,7 @@ from gpu.picture.light_paths import LightPaths
 from gpu.picture.look import Look, Lut, ViewTable
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
+from gpu.picture.prior import Prior
 from gpu.picture.readout import Readout
 from gpu.picture.saved import NO_BLOCK, Saved
 from gpu.picture.shared_block import SharedBlock
@@ -230,6 +231,13 @@ class Picture:
             return self._readout.first_hit.read(aov)
         return self._readout.variance() if aov == "variance" else self._readout.color()
 
+    def depth(self) -> np.ndarray | None:
+        """Depth of the first hit, (height, width, 1), over the samples that were traced of it; None where none is
+        complete."""
+        contexts.use(self.context)
+        hits = self._readout.first_hit
+        return hits.read("depth") if hits.samples else None
+
     def guides(self, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Albedo and normal of the first hit over exactly min(samples, most) samples, whatever was read before."""
         self.trace_guides(most=most)
@@ -262,16 +270,20 @@ class Picture:
         color: np.ndarray | None = None,
         p3: bool = False,
         lut: Lut | None = None,
+        prior: Prior | None = None,
     ) -> np.ndarray:
         """Display-encoded (height, width, 4), straight alpha: uint8, or float32 in 0..1 with dtype "f4".
 
-        Colour: see `Look`; `color` in the place of the picture's own, as `read` gives it. Other AOVs: see
+        Colour: see `Look`; `color` in the place of the picture's own, as `read` gives it; averaged with the guess of
+        a `prior` of this size, which is shown alone where the picture has no samples. Other AOVs: see
         `display.encode`.
         """
-        self._need_samples()
+        if prior is None:
+            self._need_samples()
+        contexts.use(self.context)
         if aov != "color":
             return display.encode(aov, self.read(aov), dtype)
-        return self._readout.display(Look(exposure, tone_map, p3, lut), dtype, color)
+        return self._readout.display(Look(exposure, tone_map, p3, lut), dtype, color, prior, self.samples)
 
     def release(self) -> None:
         """Release the device's memory."""

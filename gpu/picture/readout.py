@@ -20,6 +20,7 @@ from gpu.picture.first_hit import FirstHit
 from gpu.picture.light_paths import LightPaths
 from gpu.picture.look import Look
 from gpu.picture.noise_meter import NoiseMeter
+from gpu.picture.prior import Prior
 from gpu.picture.resolve import resolve
 from gpu.picture.schedule import Tile, work_groups
 
@@ -75,17 +76,22 @@ class Readout:
             error, mean = float(np.sqrt(error**2 + squared.mean())), mean + float(light.mean())
         return error / mean if mean else 0.0
 
-    def display(self, look: Look, dtype: str, color: np.ndarray | None) -> np.ndarray:
-        """Colour as `Picture.display` gives it."""
+    def display(
+        self, look: Look, dtype: str, color: np.ndarray | None, prior: Prior | None, samples: int
+    ) -> np.ndarray:
+        """Colour as `Picture.display` gives it, of a picture with that many samples."""
         d = self._dispatcher
         own: dict[Slot, Any] = {}
         bind = self._sums.bind
-        if color is None and self._light.on:
+        if samples and color is None and (self._light.on or prior is not None):
             color = self.color()
         if color is not None:
-            given = {Slot.SUM: color, Slot.MOMENTS: np.ones_like(color)}
+            weight = 1 if prior is None else samples
+            given = {Slot.SUM: color * np.float32(weight), Slot.MOMENTS: np.full_like(color, weight)}
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
-            bind = partial(self._sums.bind_alone, own)
+            bind = partial(self._sums.bind_alone, own, None if prior is None else prior.guess)
+        elif prior is not None:
+            bind = partial(self._sums.bind_alone, prior.guess, None)
         count = self._size[0] * self._size[1]
         pixels = resolve(d.context, self._kernels, d.scene.looks, bind, count, d.most_pixels, look, dtype)
         for buffer in own.values():

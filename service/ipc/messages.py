@@ -66,6 +66,7 @@ class View:
     encoding: Encoding = "u1"
     p3: bool = False  # for a screen with the primaries of Display P3
     lut: Lut | None = None  # what is displayed goes through it last
+    prior: bool = False  # until an edited picture has samples, a guess from what it showed before is welcome
 
 
 @dataclass(frozen=True)
@@ -258,6 +259,7 @@ class Frame:
     scale: float
     last: bool
     denoised: bool = False
+    prior: bool = False  # it has a guess in it, and is of full size whatever `scale` is
     provisional: bool = False  # the generation may still fail
 
 

@@ -20,7 +20,9 @@ from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, 
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact
-QUALITY, LAST_QUALITY = 80, 90  # JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays
+# JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays, and for small ones: enlarged, they would show blocks
+# of colour.
+QUALITY, LAST_QUALITY = 80, 90
 MOST_FPS = 240
 
 
@@ -43,10 +45,17 @@ class View(Model):
     aov: Aov = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
     bits: Annotated[Bits, Field(description="Of a PNG's channels.")] = 8
+    prior: Annotated[
+        bool,
+        Field(
+            description="Whether frames after an edit may show a guess, of full size, until the picture has samples "
+            "of its own: what it showed before, corrected by first looks. Their headers say `prior`."
+        ),
+    ] = False
 
     def for_renderer(self, lut: messages.Lut | None = None) -> messages.View:
         encoding = images.FORMATS[self.format].encoding(self.bits)
-        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3, lut)
+        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3, lut, self.prior)
 
     @property
     def p3(self) -> bool:
@@ -100,7 +109,8 @@ def parse(text: str) -> Message:
 
 def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
     """A frame's message: header length, header, image. Takes milliseconds."""
-    quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
+    small = frame.scale < 1.0 and not frame.prior
+    quality = view.quality or (LAST_QUALITY if frame.last or small else QUALITY)
     stands = encoding_of(view.tone_map, view.p3) if view.aov == "color" else SRGB
     body = images.encode(frame.pixels, view.format, bits=view.bits, quality=quality, encoding=stands)
     height, width = frame.pixels.shape[:2]
@@ -117,7 +127,6 @@ def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
         "eta_s": progress.eta_s,
         "scale": frame.scale,
     }
-    if frame.denoised:
-        header["denoised"] = True
+    header |= {name: True for name in ("denoised", "prior") if getattr(frame, name)}
     text = json.dumps(header, separators=(",", ":")).encode()
     return b"".join((struct.pack("<I", len(text)), text, body))

@@ -90,7 +90,8 @@ class Task:
     @property
     def bytes(self) -> int:
         """The bytes that it takes on the device."""
-        return self.picture.residency.bytes + self.picture.updates.preview.bytes
+        picture = self.picture
+        return picture.residency.bytes + picture.updates.preview.bytes + picture.under_hand.bytes
 
     @property
     def rested_since(self) -> float:

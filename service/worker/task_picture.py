@@ -20,6 +20,7 @@ from service.worker.progress.progress import ProgressTracker
 from service.worker.updates import Updates
 from service.worker.view.denoise_policy import DenoisePolicy
 from service.worker.view.frames import SLICE_S, FrameSource
+from service.worker.view.under_hand import UnderHand
 
 WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 
@@ -51,7 +52,9 @@ class TaskPicture:
         self.residency = Residency(renderer, context.memory, holder, self._part)
         self.tracker = ProgressTracker()
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
-        self.frames = FrameSource(context, number, client, self.residency, self.tracker, denoising, self._finish)
+        self.under_hand = UnderHand(renderer, self.residency.make_room)
+        shown = denoising, self.under_hand
+        self.frames = FrameSource(context, number, client, self.residency, self.tracker, *shown, self._finish)
         self.home = Home(number, context.send)
         self.ending = Ending(context, number, self.residency, self.tracker, self.frames, self.answer, self.home.bands)
         self._sharers = context.sharers
@@ -114,6 +117,15 @@ class TaskPicture:
 
     def _trace(self, paused: bool) -> None:
         residency, tracker, scale = self.residency, self.tracker, self._scale
+        lacking = self.under_hand.lacks(residency.ladder, tracker.pixel_s) if tracker.interactive else None
+        if scale == 1.0 and lacking is not None:
+            residency.insist(lambda: residency.ladder.picture(lacking).trace(FULL_S, 1))
+            return
+        if scale == 1.0 and tracker.interactive and self.under_hand.lacks_depth(residency.full):
+            traced = self.frames.trace_first_hit(residency.full)
+            self.under_hand.has_depth = traced is True
+            if traced is not None:
+                return
         picture = residency.ladder.picture(scale)
         cap = 1 if self.unseen or scale < 1.0 else tracker.cap(residency)
         tracker.clock.start()
@@ -173,6 +185,7 @@ class TaskPicture:
             return  # its first one failed, which was said; only a whole scene helps
         settings = RenderSettings(**update.settings) if update.settings is not None else updates.settings
         assert settings is not None  # a task's first update has them
+        self._keep(update)
         try:
             made = residency.change(update, edited, settings)
         except GpuError as error:
@@ -201,6 +214,14 @@ class TaskPicture:
             self._send(Loaded(*told, full.traces_caustics))
         if update.scene is not None or update.settings is not None:
             updates.foresee(settings)
+
+    def _keep(self, update: Update) -> None:
+        """Keep the picture that is about to be edited, as a guess at the next one; or none, where that is another."""
+        residency, latest = self.residency, self.frames.denoising.latest
+        if update.scene is not None or update.settings is not None:
+            self.under_hand.release()
+        elif update.edit is not None and self.tracker.interactive and residency.loaded is not None:
+            self.under_hand.keep(residency.ladder, latest.pixels if latest else None)
 
     def evict(self) -> None:
         """Leave the device: for the machine's memory, or for good where the server has the picture already."""
@@ -239,6 +260,7 @@ class TaskPicture:
 
     def look(self, want: Want) -> None:
         """Note which frame is wanted; `answer` sends it."""
+        self.under_hand.wanted = want.view.prior
         self.frames.want = want
 
     def answer(self) -> bool:
@@ -282,11 +304,13 @@ class TaskPicture:
 
     def _part(self) -> None:
         """Have all helpers let go of resources that are about to leave the device."""
+        self.under_hand.release()
         self.frames.part()
 
     def _restart(self) -> None:
         """Begin a picture without samples, at a scale that can be shown soon where a person looks on."""
         self.frames.restart()
+        self.under_hand.restart()
         self.tracker.restart()
         self.home.restart()
         first = self.residency.loaded is not None and self.tracker.interactive

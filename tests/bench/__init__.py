@@ -5,6 +5,7 @@ compare         this checkout beside an earlier revision
 compare_run     one side of `compare`
 first_frames    `frames`: every slider of every built-in scene, changes of scene, thumbnails
 sliders         the sliders of a scene's document
+under_hand      `drag`: how wrong the picture is after each step of a drag
 hand            from a slider to other pixels, in a real browser
 hemisphere      how error falls with samples of the hemisphere, and with time
 peers           Sunbox beside Mitsuba 3 and Cycles

@@ -45,6 +45,8 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--scenes", metavar="NAMES", help="only these built-in scenes, separated by commas")
     command.add_argument("--runs", type=_count, default=5, metavar="N", help="moves of a slider (default: 5)")
 
+    add("drag", _drag, "how wrong the picture is in the first 200 ms after each step of a drag")
+
     add("hand", _hand, "from a slider to other pixels, in a browser")
 
     command = add("hemisphere", _hemisphere, "error of uniform directions beside Sunbox's, over samples and time")
@@ -107,6 +109,16 @@ def _frames(arguments: argparse.Namespace) -> int:
     document = first_frames.measure(scenes, progress, arguments.runs)
     print(first_frames.table(document))
     write_figures(output, document)
+    return 0
+
+
+def _drag(arguments: argparse.Namespace) -> int:
+    output = output_path(arguments.output)
+    from tests.bench import under_hand
+
+    figures = under_hand.measure()
+    print(under_hand.table(figures))
+    write_figures(output, figures)
     return 0
 
 

@@ -53,5 +53,11 @@ export function viewOf(ui, view, { isPaused, quality, isExact }) {
     quality: isPaused ? quality : null,
     format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
     max_fps: painted ? 4 : isExact ? 8 : null,
+    prior: !painted && !isExact,
   };
 }
+
+// The size of the picture that a frame stands for. A preview's own sides tell it to a pixel or so of the preview's; with
+// a guess in it, it has full size.
+export const fullSize = ({ width, height, scale, prior }) =>
+  prior ? { width, height } : { width: Math.round(width / scale), height: Math.round(height / scale) };

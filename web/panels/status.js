@@ -1,5 +1,6 @@
 // The pill at the foot of the picture: how far it is and how good; and, opened, how fast, how long and by whom.
 
+import { fullSize } from "../document/picture-view.js";
 import { count, duration, percent } from "../lib/format-text.js";
 
 const NOTHING = "–";
@@ -13,9 +14,11 @@ export class Status {
   }
 
   // A frame's header; `limit` is the number of samples at which the picture is ready, or null.
-  frame({ samples, noise, elapsed_s, eta_s, scale, width, height }, limit) {
+  frame(header, limit) {
+    const { samples, noise, elapsed_s, eta_s, scale } = header;
+    const { width, height } = fullSize(header);
     const places = this.#places;
-    places.size.textContent = `${Math.round(width / scale)}\u202f×\u202f${Math.round(height / scale)}`;
+    places.size.textContent = `${width}\u202f×\u202f${height}`;
     places.samples.textContent = limit ? `${count(samples)} / ${count(limit)}` : count(samples);
     const rate = samples / elapsed_s;
     places.rate.textContent = Number.isFinite(rate) ? Number(rate.toPrecision(2)) : NOTHING;

@@ -1,6 +1,6 @@
 // Frames in: decoded off the main thread, painted with the display's beat, acknowledged after that.
 
-import { isPainted, isWide } from "../document/picture-view.js";
+import { fullSize, isPainted, isWide } from "../document/picture-view.js";
 
 export class Viewport {
   #context;
@@ -64,11 +64,10 @@ export class Viewport {
     this.#next = null;
   }
 
-  // A preview is drawn at the size it stands for, so that refining moves nothing; its own sides tell that
-  // size only to a pixel or so of the preview's.
-  #fit({ width, height, scale }) {
-    const full = { width: Math.round(width / scale), height: Math.round(height / scale) };
-    const slack = scale < 1 ? 1 / scale : 0;
+  // A preview is drawn at the size it stands for, so that refining moves nothing.
+  #fit(header) {
+    const full = fullSize(header);
+    const slack = header.scale < 1 && !header.prior ? 1 / header.scale : 0;
     const fits = (side) => Math.abs(this.canvas[side] - full[side]) <= slack;
     if (!fits("width") || !fits("height")) Object.assign(this.canvas, full);
   }

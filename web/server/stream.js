@@ -136,7 +136,8 @@ export class Stream {
   #tellView() {
     if (!this.#sent) return;
     const capture = this.#captures[0];
-    const view = { ...this.#sent.view, ...capture?.view };
+    // What is kept has no guess in it.
+    const view = { ...this.#sent.view, ...(capture && { prior: false, ...capture.view }) };
     this.#seen = null;
     this.#connection.send(message.view(view));
     this.#connection.ask(() => {

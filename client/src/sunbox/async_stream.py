@@ -98,8 +98,8 @@ class AsyncStream:
         await self._send(message)
 
     async def view(self, **view: Any) -> None:
-        """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits. The picture
-        goes on; where it is done, another frame comes."""
+        """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits, prior. The
+        picture goes on; where it is done, another frame comes."""
         self._view |= view
         self._samples = -1
         await self._send({"type": "view", **view})

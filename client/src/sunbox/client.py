@@ -366,7 +366,7 @@ class Stream:
         run(self._stream.update(patch, **settings))
 
     def view(self, **view: Any) -> None:
-        """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits."""
+        """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits, prior."""
         run(self._stream.view(**view))
 
     def pause(self) -> None:

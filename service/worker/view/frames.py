@@ -17,10 +17,11 @@ from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
 from service.worker.view.denoise_policy import Denoised, DenoisePolicy
+from service.worker.view.under_hand import UnderHand
 from service.worker.view.view_tables import view_table
 
 if TYPE_CHECKING:
-    from gpu import Picture
+    from gpu import Picture, Prior
 
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
 
@@ -46,6 +47,7 @@ class FrameSource:
         residency: Residency,
         tracker: ProgressTracker,
         denoising: DenoisePolicy,
+        under_hand: UnderHand,
         finish: Callable[[], None],
     ) -> None:
         """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
@@ -53,7 +55,7 @@ class FrameSource:
         self.scale: float | None = None  # of what there is to see
         self.owes_done = False
         self.denoising = denoising
-        self._number, self._send, self._finish = number, context.send, finish
+        self._number, self._send, self._finish, self._under_hand = number, context.send, finish, under_hand
         self._residency, self._tracker = residency, tracker
         self._wait = KernelWait(context.compiler, client)  # for the kernel of the AOVs of the first hit
         self._served: _Content | None = None  # of the last frame that was sent
@@ -123,12 +125,18 @@ class FrameSource:
         content = _Content(tracker.generation, shown, progress.samples, tracker.reason, fine)
         if content == self._served and not want.anyway:
             return False
-        pixels = pixels_of(picture, want.view, clean)
         last = tracker.reason is not None and whole
+        prior = None if clean or last else self._guess(want.view, shown)
+        pixels = pixels_of(self._residency.full if prior else picture, want.view, clean, prior)
         self._served, self.want = content, None
-        denoised = clean is not None
-        self._send(Frame(self._number, want.serial, tracker.generation, pixels, progress, shown, last, denoised))
+        what = pixels, progress, shown, last, clean is not None, prior is not None
+        self._send(Frame(self._number, want.serial, tracker.generation, *what))
         return True
+
+    def _guess(self, view: View, scale: float) -> Prior | None:
+        """The guess at the picture that is shown until that has samples of its own."""
+        shows = view.prior and view.aov == "color" and view.encoding != "linear"
+        return self._under_hand.shown(self._residency.ladder, scale) if shows else None
 
     def _denoised_frame(self) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
@@ -224,6 +232,15 @@ class FrameSource:
         self._guided, self._covers = picture, coverage
         return True
 
+    def trace_first_hit(self, picture: Picture) -> bool | None:
+        """Trace a slice of one sample of the AOVs of the first hit; whether it is complete. None while the kernel for
+        it is compiled, or where the denoiser has them traced."""
+        if self.denoising.wanted or self._waits(picture):
+            return None
+        if not picture.guided:
+            self._residency.make_room(picture_bytes(picture.settings, True) - picture_bytes(picture.settings))
+        return picture.trace_guides(SLICE_S, most=1)
+
     def _trace_guides(self) -> bool:
         """Trace a slice of the AOVs of the first hit where a read waits for them; then answer those reads."""
         picture = self._guided
@@ -241,12 +258,12 @@ class FrameSource:
         return True
 
 
-def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarray:
-    """The pixels of a picture, (height, width, 4), as the view wants them."""
+def pixels_of(picture: Picture, view: View, clean: Denoised | None, prior: Prior | None = None) -> np.ndarray:
+    """The pixels of a picture, (height, width, 4), as the view wants them; with the guess of a `prior`, if any."""
     color = clean.pixels if clean else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
     lut = Lut(view.lut.key, view.lut.values, view.lut.low, view.lut.high) if view.lut else None
     named = view_of(view.tone_map, view.p3)
     tone_map = view_table(*named) if named else view.tone_map
-    return picture.display(view.aov, view.exposure, tone_map, view.encoding, color, view.p3, lut)
+    return picture.display(view.aov, view.exposure, tone_map, view.encoding, color, view.p3, lut, prior)

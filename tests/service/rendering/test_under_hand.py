@@ -1,0 +1,92 @@
+"""Frames with a guess in them: who asked for them gets them after an edit, and nothing else ever has one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from tests.serving import SCENE, Client, Picture, Server
+from tests.serving import client as opened
+
+# So large that a first look at it is small on a processor.
+LARGE = {"width": 800, "height": 600, "max_samples": 1 << 20, "max_bounces": 2}
+ASKS = {"format": "jpeg", "prior": True}
+DARK = {"materials": {"ball": {"base_color": [0.05, 0.05, 0.05]}}}
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[Client]:
+    with opened(server) as connected:
+        yield connected
+
+
+def at_rest(client: Client, generation: int) -> Picture:
+    """The first frame of a picture that is worth keeping."""
+    while True:
+        frame = client.frame(generation)
+        if frame.scale == 1.0 and frame.samples >= 20:
+            return frame
+
+
+def frames_to(client: Client, generation: int, samples: int) -> list[Picture]:
+    frames = []
+    while not frames or frames[-1].scale < 1.0 or frames[-1].samples < samples:
+        frames.append(client.frame(generation))
+    return frames
+
+
+def test_a_guess_fades_as_samples_come(client: Client) -> None:
+    client.start(generation=1, settings=LARGE, view=ASKS)
+    assert "prior" not in at_rest(client, 1).header
+    client.say("update", generation=2, scene=DARK)
+    frames = frames_to(client, 2, 70)
+    first = frames[0]
+    assert first.scale < 1.0 and first.prior and (first.width, first.height) == (800, 600)
+    has = ["prior" in frame.header for frame in frames]
+    assert has == sorted(has, reverse=True) and not has[-1]
+    assert all((frame.width, frame.height) == (800, 600) for frame in frames if frame.header.get("prior"))
+
+
+def test_nobody_else_gets_one(client: Client) -> None:
+    client.start(generation=1, settings=LARGE, view={"format": "jpeg"})
+    at_rest(client, 1)
+    client.say("update", generation=2, scene=DARK)
+    first = client.frame(2)
+    assert first.scale < 1.0 and "prior" not in first.header and first.width < 800
+
+
+def test_a_moved_camera_sees_the_old_picture(client: Client) -> None:
+    client.start(generation=1, settings=LARGE, view=ASKS)
+    at_rest(client, 1)
+    client.silence(2.0)  # the depth is traced once the picture is good enough, and its kernel is compiled
+    client.say("update", generation=2, scene={"camera": {"position": [0.4, 0.2, 4]}})
+    first = client.frame(2)
+    assert first.scale < 1.0 and first.prior and first.width == 800
+
+
+def test_where_everything_has_changed_there_is_none(client: Client) -> None:
+    client.start(generation=1, settings=LARGE, view=ASKS)
+    at_rest(client, 1)
+    client.say("update", generation=2, settings={"seed": 5})
+    assert "prior" not in client.frame(2).header
+
+
+def test_what_is_captured_has_none(client: Client, server: Server) -> None:
+    client.start(generation=1, settings={**LARGE, "max_samples": 24}, view=ASKS)
+    client.finished()
+    client.say("update", generation=2, scene=DARK)
+    done, last = client.finished()
+    assert done["generation"] == 2 and "prior" not in last.header
+    client.say("view", format="rgba32f")
+    raw = client.frame(2)
+    scene = {
+        **SCENE,
+        "materials": {**SCENE["materials"], "ball": SCENE["materials"]["ball"] | DARK["materials"]["ball"]},
+    }
+    body = {"scene": scene, "settings": {**LARGE, "max_samples": 24}}
+    answer = server.http.post("/v1/render?format=npy", json=body)
+    assert answer.status_code == 200
+    whole = np.frombuffer(answer.content[-raw.array().nbytes :], np.float32).reshape(raw.array().shape)
+    np.testing.assert_array_equal(raw.array(), whole)
