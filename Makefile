@@ -20,15 +20,13 @@ unexport PYTHONDONTWRITEBYTECODE
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
 
-# All at the lowest priority is all at one: a server's renderer stands back from it by ten steps, and would get a tenth
-# of a core beside a test that traces in its own process.
 test: WITHOUT = $(if $(CI),, and not bench)
 test:
 	@.ci/setup test
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	nice -n 19 .venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm$(WITHOUT)' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm$(WITHOUT)' --durations 20
 	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
 	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
 
