@@ -96,7 +96,10 @@ class LightPaths:
         if not caustics.hides(d.scene.arrays):
             return []
         if self.on:
-            return []
+            return [
+                "the caustics of lamps without extent are there where they are seen directly; in mirrors, through "
+                "glass and as light for other surfaces they are missing"
+            ]
         if d.settings.adaptive or d.settings.filter_glossy > 0:
             how = '; they need settings.caustics "light", which goes neither with adaptive nor with filter_glossy'
         elif d.settings.width * d.settings.height > MOST_SPLATTED:
