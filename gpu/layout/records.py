@@ -331,9 +331,10 @@ class Uniforms(Record):
     group_stride: u32  # places from one work group to the next; see gpu.picture.schedule.group_stride
     footprint_share: f32  # of a pixel's width: that of the footprint of one camera ray; see gpu.picture.filters
     filter_glossy: f32  # least roughness after a path's first scattering
+    glint_chance: f32  # least of reflection, and of refraction, at a smooth surface that the camera sees
+    # These two stay the last: kernels without instances lack them (gpu/kernels/instances_glsl.py).
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
-    glint_chance: f32  # least of reflection, and of refraction, at a smooth surface that the camera sees
 
 
 WORK_GROUP = 8  # invocations a side of the work groups of kernels over pixels; fewer than 8 can hang llvmpipe

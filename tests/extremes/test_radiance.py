@@ -162,7 +162,7 @@ def test_odd_places_stay_sound(gpu: Renderer, row: str) -> None:
     for estimator in ESTIMATORS if LONG else ("mis",):
         seen = Seen(gpu, everything(shapes=shapes, camera=camera), 4, width=48, height=32, estimator=estimator)
         brightest = max(brightest, float(seen.color.max()))
-        assert all("degenerate" in line for line in seen.warnings)
+        assert all("degenerate" in line or "caustics" in line for line in seen.warnings)
     assert brightest > 0
     assert row != "slivers" or seen.warnings == ["/shapes/0: 2 degenerate triangles skipped"]
 

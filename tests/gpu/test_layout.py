@@ -7,8 +7,9 @@ import pytest
 
 from gpu import Renderer, layout
 from gpu.device.textures import linear_texture
-from gpu.kernels import layout_glsl
+from gpu.kernels import instances_glsl, layout_glsl
 from gpu.kernels.features import COUNTS, FEW, defines, everything
+from gpu.kernels.flag_table import FLAGS
 from gpu.layout import BUFFERS, bindings
 from gpu.layout.bindings import COUNTED
 from gpu.layout.record import LayoutError, Record, f32, vec3
@@ -89,6 +90,11 @@ def test_uniform_block_arrives(gpu: Renderer) -> None:
         thing.release()
 
 
+def test_what_only_some_kernels_have_comes_last() -> None:
+    """Else what follows would lie elsewhere in the others."""
+    assert tuple(layout.Uniforms.members)[-len(instances_glsl.UNIFORMS) :] == instances_glsl.UNIFORMS
+
+
 def test_a_hole_is_refused() -> None:
     with pytest.raises(LayoutError, match="hole"):
         type("Holed", (Record,), {"__annotations__": {"a": "f32", "b": "vec3"}})
@@ -102,5 +108,5 @@ def test_a_hole_is_refused() -> None:
 
 def test_every_flag_and_count_is_defined() -> None:
     known = defines(frozenset())
-    assert everything() <= set(known)
+    assert {name for name in everything() if not FLAGS[name].of_settings} <= set(known)
     assert {*COUNTS, *FEW} == {f"{name.upper()}_COUNT" for name in COUNTED}
