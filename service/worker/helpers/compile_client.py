@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 TRIES = 3  # failures in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
 SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
-# What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then.
+# What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then, or
+# it was there for one picture alone.
 # A kernel can take a minute, and is compiled from its beginning again where the renderer ends first.
-SPARE_AFTER_S = 60.0
+SPARE_AFTER_S = 20.0
 REMEMBERED = 256  # kernels in memory; records on the disk tell of the others
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
 
 # now: somebody waits; soon: somebody may in some seconds, and tracing goes on a little slower meanwhile; spare: in
-# time that nobody else wants, after the first minute, however long that takes
+# time that nobody else wants, some time after the start, however long that takes
 Priority = Literal["now", "soon", "spare"]
 
 Done = Callable[[float], None]  # called with the milliseconds that a kernel took
