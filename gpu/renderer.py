@@ -52,7 +52,7 @@ class Renderer:
         raised: frozenset[str] = frozenset(),
     ) -> Scene:
         """Upload a scene. `editing` also raises the flags that sliders of its materials could raise, and those that
-        were `raised` before; `everything` raises every flag, whatever the scene needs.
+        were `raised` before; `everything` raises every common flag besides.
 
         Raises SceneTooLarge, OutOfMemory.
         """

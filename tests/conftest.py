@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -80,6 +82,8 @@ def pictures() -> Iterator[None]:
     """Pictures last as long as the tests of their file."""
     yield
     release_pictures()
+    with suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)  # glibc would keep some GB that LLVM took
 
 
 @pytest.fixture(scope="session")

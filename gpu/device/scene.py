@@ -155,7 +155,7 @@ class Scene:
     def _flags(self) -> frozenset[str]:
         """The flags of its kernels, by its arrays and by the flags that it had before."""
         if self._everything:
-            return features.everything()
+            return features.common() | features.flags(self.arrays)
         if self._editing and self._raised:
             return features.grown(self._raised, self.arrays)
         return features.flags(self.arrays, self._editing)

@@ -25,6 +25,11 @@ def everything() -> frozenset[str]:
     return frozenset(FLAGS)
 
 
+def common() -> frozenset[str]:
+    """The flags of the kernel for many scenes. With the rare ones, too, LLVM takes more than ten minutes and 7 GB."""
+    return frozenset(flag.name for flag in FLAGS.values() if flag.in_general)
+
+
 def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     """The flags that `scene` raises; with `editing`, also those that its kernels have before a slider raises them."""
     raised = frozenset(flag.name for flag in FLAGS.values() if flag.asks(scene))

@@ -32,7 +32,7 @@ _FACES, _CAPS = 6, 2  # quads that a box becomes when it shines, and a cylinder 
 
 def flags() -> frozenset[str]:
     """The flags of the kernel for many scenes."""
-    return frozenset(flag.name for flag in FLAGS.values() if flag.in_general)
+    return features.common()
 
 
 def superset(arrays: SceneArrays) -> frozenset[str]:

@@ -72,14 +72,14 @@ def kernel(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]
 
 
 def measured(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]:
-    """What the scene's kernel saves beside one with every feature; both are compiled, and measured here and now."""
-    print("compiling and measuring; the kernel with every feature may take minutes", file=sys.stderr)
+    """What the scene's kernel saves beside the one for many scenes; both are compiled, and measured here and now."""
+    print("compiling and measuring; the kernel for many scenes may take minutes", file=sys.stderr)
     price = renderer.kernel_cost(packed.arrays)
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("not needed", " ".join(price.spared)),
         ("its kernel", f"compiled in {price.compile_ms:.0f} ms, {own} at 8 bounces"),
-        ("one with all", f"compiled in {price.full_compile_ms:.0f} ms, {full}: {price.saving:.0%} is saved"),
+        ("that for many", f"compiled in {price.full_compile_ms:.0f} ms, {full}: {price.saving:.0%} is saved"),
     ]
 
 
