@@ -211,7 +211,7 @@ def _any_of(names: Sequence[str]) -> str:
 
 def _info(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF, OBJ, PLY or STL model")
-    text = "also compile the scene's kernel and one with all common features, and measure both: a minute or more at first"
+    text = "also compile the scene's kernel and one with all common features, and measure both: a minute or more"
     command.add_argument("--measure", action="store_true", help=text)
     _asset_root(command)
 

@@ -66,7 +66,7 @@ def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> 
     [
         ("TEXTURES", ["TRANSMISSION"]),
         ("TRIANGLES", ["TEXTURES", "VERTEX_COLORS"]),
-        ("TRANSMISSION", ["FILM", "DISPERSION", "THIN_WALLS", "STRAIGHT"]),
+        ("TRANSMISSION", ["THIN_WALLS", "STRAIGHT"]),
     ],
 )
 def test_a_flag_more_shows_the_same(gpu: Renderer, name: str, more: list[str]) -> None:
