@@ -44,9 +44,10 @@ class ResolvedSettings:
     resolution_scale: float
     adaptive: bool
     clamp: float | None
-    caustics: str | None
-    filter_glossy: float
     denoise: bool
+    # Stored renders that began before these were there have no such values, and go on as they began.
+    caustics: str | None = "paths"
+    filter_glossy: float = 0.0
 
     @property
     def render_width(self) -> int:

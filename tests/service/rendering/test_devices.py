@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from service.renderers.pool import devices as seating
 from service.renderers.pool.devices import missing_device, seats
 from service.system.child_processes import inherited_environment
 from service.worker.helpers import compile_main
-from tests.serving import SCENE, Server
+from tests.serving import SCENE, Server, wait_until
 
 GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "software", "software": True}
 
@@ -148,9 +149,15 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
     server.wait()
     workers = [pid for pid in server.children() if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     share = configs.cores() // 2
-    for worker in workers:
+
+
+    def rasterizers(worker: int) -> int:
         threads = [(path / "comm").read_text() for path in Path(f"/proc/{worker}/task").iterdir()]
-        assert sum(name.startswith("llvmpipe-") for name in threads) - share in (0, 1)
+        return sum(name.startswith("llvmpipe-") for name in threads)
+
+    for worker in workers:
+        wait_until(partial(rasterizers, worker))  # the server is ready when one of them is
+        assert rasterizers(worker) - share in (0, 1)
     found = server.http.get("/v1/info").json()
     assert [(each["id"], each["device"]) for each in found["renderers"]] == [("0", "llvmpipe"), ("1", "llvmpipe")]
     assert {each["state"] for each in found["renderers"]} <= {"ready", "starting"}
