@@ -340,7 +340,6 @@ _ROWS = (
         "HAS_FILM",
         lambda s: bool(filmed(s.materials).any()),
         alone_with=_flags_of(with_optional("film_thickness")),
-        evaluated_with=_flags_of(with_optional("film_thickness")),
         in_general=False,
     ),
     Flag(

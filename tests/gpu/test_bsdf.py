@@ -358,6 +358,7 @@ def test_terms_of_principled(gpu: Renderer) -> None:
 
 
 def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
+    """But a film's: its code takes LLVM ten times as long as all other code, and is compiled when it is asked for."""
     foreseen = list(kernel_keys.bsdf_keys())
     used = set()
     lab = pack_material(MicrofacetMaterial(type="microfacet"))
@@ -365,7 +366,8 @@ def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
     assert measured.record is not None
     file = lone(materials(model=measured.number))
     setattr(file, measured.records, np.zeros((measured.record.words // 4, 4), np.uint32))
-    for material in [*map(lone, (ALL | LAYERED).values()), lab, file]:
+    filmless = [lone(row) for row in (ALL | LAYERED).values() if not (row["film_thickness"] > 0).any()]
+    for material in [*filmless, lab, file]:
         glowing = material.materials.copy()
         glowing["emission"], glowing["opacity"], glowing["attenuation_distance"] = 3.0, 0.5, 1.0
         for question in kernels.ENTRIES:

@@ -150,7 +150,6 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
     workers = [pid for pid in server.children() if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     share = configs.cores() // 2
 
-
     def rasterizers(worker: int) -> int:
         threads = [(path / "comm").read_text() for path in Path(f"/proc/{worker}/task").iterdir()]
         return sum(name.startswith("llvmpipe-") for name in threads)

@@ -11,7 +11,7 @@ from tests.serving import SCENE, Client, Picture, Server
 from tests.serving import client as opened
 
 # So large that a first look at it is small on a processor.
-LARGE = {"width": 800, "height": 600, "max_samples": 1 << 20, "max_bounces": 2}
+LARGE = {"width": 640, "height": 480, "max_samples": 1 << 20, "max_bounces": 2}
 ASKS = {"format": "jpeg", "prior": True}
 DARK = {"materials": {"ball": {"base_color": [0.05, 0.05, 0.05]}}}
 
@@ -43,10 +43,10 @@ def test_a_guess_fades_as_samples_come(client: Client) -> None:
     client.say("update", generation=2, scene=DARK)
     frames = frames_to(client, 2, 70)
     first = frames[0]
-    assert first.scale < 1.0 and first.prior and (first.width, first.height) == (800, 600)
+    assert first.scale < 1.0 and first.prior and (first.width, first.height) == (640, 480)
     has = ["prior" in frame.header for frame in frames]
     assert has == sorted(has, reverse=True) and not has[-1]
-    assert all((frame.width, frame.height) == (800, 600) for frame in frames if frame.header.get("prior"))
+    assert all((frame.width, frame.height) == (640, 480) for frame in frames if frame.header.get("prior"))
 
 
 def test_nobody_else_gets_one(client: Client) -> None:
@@ -54,7 +54,7 @@ def test_nobody_else_gets_one(client: Client) -> None:
     at_rest(client, 1)
     client.say("update", generation=2, scene=DARK)
     first = client.frame(2)
-    assert first.scale < 1.0 and "prior" not in first.header and first.width < 800
+    assert first.scale < 1.0 and "prior" not in first.header and first.width < 640
 
 
 def test_a_moved_camera_sees_the_old_picture(client: Client) -> None:
@@ -63,7 +63,7 @@ def test_a_moved_camera_sees_the_old_picture(client: Client) -> None:
     client.silence(2.0)  # the depth is traced once the picture is good enough, and its kernel is compiled
     client.say("update", generation=2, scene={"camera": {"position": [0.4, 0.2, 4]}})
     first = client.frame(2)
-    assert first.scale < 1.0 and first.prior and first.width == 800
+    assert first.scale < 1.0 and first.prior and first.width == 640
 
 
 def test_where_everything_has_changed_there_is_none(client: Client) -> None:
