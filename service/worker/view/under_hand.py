@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from gpu import Picture, Renderer
 
 MOST_PIXELS = 1 << 21  # of a picture that is kept: reading back more would delay the first look
-LEAST_SAMPLES = 16  # of a picture that is worth keeping
+LEAST_SAMPLES = 4  # of a picture that is worth keeping ...
+GOOD_SAMPLES = 16  # ... in the place of an earlier one, from which edits have led away
 # How many samples a pixel of the guess counts for, until the picture has as many of its own as stand before it.
 WORTH = ((16, 8.0), (32, 4.0), (64, 2.0))
 
@@ -67,7 +68,7 @@ class UnderHand:
         """Keep the picture, or its denoised form, before an edit. One that has too few samples leaves the one that
         was kept before."""
         full = ladder.full
-        if not self._fits(full):
+        if not self._fits(full) or (self._prior is not None and full.samples < GOOD_SAMPLES):
             return
         self.release()
         size = full.settings.width, full.settings.height

@@ -65,7 +65,7 @@ def test_never_more_than_two_unacknowledged(client: Client) -> None:
 
 def test_done_needs_no_credit_and_the_last_frame_follows(client: Client) -> None:
     client.acknowledges = False
-    client.start(settings={"width": 32, "height": 24, "time_limit": 0.6})
+    client.start(settings={"width": 32, "height": 24, "time_limit": 1.5})
     done, frames = client.until("done")
     assert len(frames) == 2 and frames[-1].samples < done["samples"]
     assert not client.silence(0.2)
