@@ -260,7 +260,8 @@ class TaskPicture:
 
     def look(self, want: Want) -> None:
         """Note which frame is wanted; `answer` sends it."""
-        self.under_hand.wanted = want.view.prior
+        # Who looks at the first hits has more samples of them traced than a guess needs.
+        self.under_hand.wanted = want.view.prior and want.view.aov == "color"
         self.frames.want = want
 
     def answer(self) -> bool:
