@@ -20,7 +20,7 @@ void main() {
     answers[i] = vec4(s.radiance, s.pdf);
     directions[i] = vec4(s.wi, 0.0);
 #else
-    answers[i] = environment_radiance(ask.xyz);
+    answers[i] = environment_radiance(ask.xyz, true);
     directions[i] = ask;
 #endif
 }

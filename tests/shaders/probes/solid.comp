@@ -16,5 +16,5 @@ void main() {
     SurfacePoint at = shapes_point(Hit(0.0, NONE, vec2(0.0)), vec3(0.0), vec3(0.0, 0.0, 1.0));
     at.p = asks[i].xyz;
     at.uv = asks[i].xy;
-    answers[i] = vec4(texture_emission(at), texture_opacity(at));
+    answers[i] = vec4(texture_emission(at, footprint_none()), texture_opacity(at));
 }
