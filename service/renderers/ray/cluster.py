@@ -27,7 +27,7 @@ from service.renderers.ray.renderers import described
 from service.system.child_processes import inherited_environment
 from service.system.executors import tending
 
-JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself much earlier
+JOIN_S = 80.0  # for the gateway to start and to join, which it gives up itself much earlier
 SILENT_S = 20.0  # without a sign of life, one of which comes every second
 FAREWELL_S = 6.0  # for the gateway to end the actors, and a cluster of its own
 RESTS = "The renderer has been given back to the Ray cluster until there is more work."

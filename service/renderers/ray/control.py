@@ -19,7 +19,7 @@ class Join:
     gpu: bool  # SUNBOX_REQUIRE_GPU
     options: dict[str, Any]  # of a renderer's process: the fields of Options that are for any node
     nodes_s: float = 15.0  # for nodes to join a head that was started just before, and renders nothing itself
-    patience_s: float = 20.0  # for a head that accepts connections and does not answer; Ray itself waits two minutes
+    patience_s: float = 60.0  # for a head that does not answer, or a cluster of our own to start on a busy machine
 
 
 @dataclass(frozen=True)
