@@ -88,9 +88,15 @@ def pictures() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def gpu() -> Iterator[Renderer]:
-    """A renderer for all tests of the session. Skips where there is no GL, saying why; never in CI."""
+    """A renderer for all tests of the session. Skips where there is no GL, saying why; never in CI.
+
+    With llvmpipe it has one thread: with more it would take all processors from what the tests beside it wait for, as
+    the renderers of servers are nicer.
+    """
     try:
-        renderer = Renderer()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("LP_NUM_THREADS", "1")
+            renderer = Renderer()
     except ContextError as error:
         if os.environ.get("CI"):
             raise

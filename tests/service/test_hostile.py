@@ -29,8 +29,8 @@ from tests import asset_files as make
 from tests.hostile import mutated_bytes, mutated_document, mutated_json
 from tests.serving import Server, client
 
-DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 300))
-FILES = int(os.environ.get("HOSTILE_FILES", 66))
+DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 150))
+FILES = int(os.environ.get("HOSTILE_FILES", 40))
 EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 8))
 SEED = int(os.environ.get("HOSTILE_SEED", 1))
 CHECKS = [

@@ -1,0 +1,86 @@
+// Scattering in media. A path that meets a particle before it comes to a surface turns there: `path.at` is that place, and
+// the phase function of Henyey and Greenstein [1941] takes the place of the BSDF, whose frame has wo as its z.
+
+// Whether the path has met a particle at the end of its ray.
+bool scatter_was(Path path) {
+#if HAS_SCATTERING
+    return path.in_medium;
+#else
+    return false;
+#endif
+}
+
+#if HAS_SCATTERING
+const uint SCATTER_ID = NONE - 1u; // in place of the id of a shape
+
+// Samples how far the ray goes before something scatters it: by the extinction of one channel, chosen as the throughput has
+// it, weighted by the balance heuristic over all three. `u` is used up, but for what `scatter_choose` leaves of it.
+void scatter_distance(float u, inout Path path) {
+    vec3 chance = path.throughput / (path.throughput.x + path.throughput.y + path.throughput.z);
+    uint channel = u < chance.x ? 0u : u < chance.x + chance.y ? 1u : 2u;
+    float before = channel == 0u ? 0.0 : channel == 1u ? chance.x : chance.x + chance.y;
+    u = clamp((u - before) / chance[channel], 0.0, 1.0 - 1.0 / 16777216.0);
+    vec3 rate = path.medium.rate;
+    float t = -log(1.0 - u) / max(rate[channel], 1.0 / INFINITY_T);
+    path.in_medium = t < path.hit.t && max_component(path.medium.scattering) > 0.0;
+    t = min(t, path.hit.t);
+    vec3 share = exp(-rate * t), weight = share, pdfs = share;
+    if (path.in_medium) {
+        weight *= path.medium.scattering;
+        pdfs *= rate;
+    }
+    float pdf = dot(chance, pdfs);
+    path.throughput *= pdf > 0.0 ? weight / pdf : vec3(0.0);
+    path.hit.t = t;
+}
+#endif
+
+// Takes the path along its ray, as far as its medium lets it.
+void scatter_travel(Sampler rng, inout Path path) {
+    vec3 emission = vec3(0.0);
+#if HAS_GLOWING_MEDIA
+    // What the whole ray collects is added even where the path turns on the way: that is its mean.
+    vec3 depth = path.medium.rate * path.hit.t;
+    vec3 length = mix((1.0 - exp(-depth)) / max(path.medium.rate, vec3(1e-30)), vec3(path.hit.t), lessThan(depth, vec3(1e-4)));
+    emission = path.medium.emission * length * path.throughput * path.eta_scale;
+    if (path.alive) path.radiance += path_clamp(emission, path.bounce > 1u + path.passed);
+#endif
+#if HAS_SCATTERING
+    path.in_medium = false;
+    float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_ROULETTE).y;
+    if (path.alive && max_component(path.medium.scattering) > 0.0) scatter_distance(u, path);
+    else path.throughput *= medium_share(path.medium, path.hit.t);
+    if (path.in_medium) {
+        path.at = shapes_none(path.o + path.hit.t * path.d, -path.d);
+        path.hit.id = SCATTER_ID;
+    }
+#else
+    path.throughput *= medium_share(path.medium, path.hit.t);
+#endif
+}
+
+// Describes the place, if there is no surface.
+void scatter_interaction(Path path, inout Interaction here) {
+#if HAS_SCATTERING
+    here.in_medium = path.in_medium;
+    here.g = path.medium.forward / max(dot(path.medium.scattering, vec3(1.0 / 3.0)), 1e-30);
+    if (path.in_medium) {
+        here.front = here.fold = here.facing = -path.d;
+        here.basis = basis_make(-path.d);
+        here.wo = vec3(0.0, 0.0, 1.0);
+        here.behind = here.mapped = false;
+        here.transmits = true;
+    }
+#endif
+}
+
+// Gives the surface the phase function, if there is none.
+void scatter_surface(Interaction here, inout Surface s) {
+#if HAS_SCATTERING
+    s.in_medium = here.in_medium;
+    s.g = here.g;
+#if ANY_TRANSMITS
+    if (here.in_medium) s.eta = 1.0;
+#endif
+#endif
+}
