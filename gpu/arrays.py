@@ -115,6 +115,8 @@ class SceneArrays:
     instance_nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # of all trees
     # Of all shapes, in the document's order, where a material reads a solid texture; else none.
     spaces: np.ndarray = field(default_factory=lambda: _empty(layout.ShapeSpace))
+    # Of all shapes, in the document's order, and of what is outside, where something is filled; else none.
+    bodies: np.ndarray = field(default_factory=lambda: _empty(layout.Body))
     instance_shift: int = 0  # bits of the number of the most triangles that an instance has
     bvh_kinds: frozenset[ShapeKind] = frozenset()
     large: Mapping[ShapeKind, int] = field(default_factory=dict)
@@ -147,6 +149,7 @@ class MovedArrays(TypedDict, total=False):
     light_tree: np.ndarray
     instances: np.ndarray
     spaces: np.ndarray
+    bodies: np.ndarray
     nodes: np.ndarray
     node_count: int
     node_origin: Vec3

@@ -79,6 +79,7 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
     for unit, was, is_ in (
         (bindings.INSTANCES_TEXTURE, old.instances, new.instances),
         (bindings.SPACES_TEXTURE, old.spaces, new.spaces),
+        (bindings.BODIES_TEXTURE, old.bodies, new.bodies),
     ):
         if was is not is_ and len(changed := np.flatnonzero(was != is_)):
             sent += update_range(textures[unit], is_, slice(int(changed[0]), int(changed[-1]) + 1))

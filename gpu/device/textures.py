@@ -22,13 +22,14 @@ KINDS = {  # channels and dtype, by texture unit
     bindings.MICROFACETS_TEXTURE: (4, "u4"),
     bindings.MEASURED_TEXTURE: (4, "u4"),
     bindings.SPACES_TEXTURE: (4, "u4"),
+    bindings.BODIES_TEXTURE: (4, "u4"),
 }
 IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
 
 
 def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
     """The values behind each texture unit that kernels with these flags read, where the scene has any: the triangles'
-    corners, instances, spaces of shapes, records and tables of models, the lights' tree, images.
+    corners, instances, spaces and bodies of shapes, records and tables of models, the lights' tree, images.
 
     KINDS has their formats.
     """
@@ -41,6 +42,7 @@ def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.n
         bindings.MICROFACETS_TEXTURE: arrays.microfacets,
         bindings.MEASURED_TEXTURE: arrays.measured,
         bindings.SPACES_TEXTURE: arrays.spaces,
+        bindings.BODIES_TEXTURE: arrays.bodies,
     }
     if arrays.textures is not None:
         values[bindings.BYTES_TEXTURE] = arrays.textures.texels

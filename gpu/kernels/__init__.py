@@ -3,12 +3,14 @@
 flag            what is known of a flag
 flag_table      a row for each flag: what needs it, and which sliders raise it
 caustics        what paths of light begin with: lights, and targets that mirror or refract
+media           what fills a scene's bodies, and the space around them
 deltas          which materials are perfectly specular
 features        what kernels are compiled with: a scene's flags before and after edits, its numbers of records
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL
 recipes_glsl    how textures are computed, as GLSL
 words_glsl      records read from words, as GLSL
+bodies_glsl     what fills shapes, as GLSL
 instances_glsl  records of instances as GLSL
 measured_glsl  records and tables of the model `measured` as GLSL
 microfacets_glsl  parameters and tables of the model `microfacet` as GLSL

@@ -13,7 +13,7 @@ from gpu.kernels import textures_glsl
 from gpu.kernels.flag import ANYWHERE, beside
 from gpu.kernels.flag_table import FLAGS, SHAPES, looped_count
 from gpu.layout import ShapeKind
-from gpu.layout.models import DELTA, TABULATED, TRANSMITTING
+from gpu.layout.models import DELTA, FLAGGED, TABULATED, TRANSMITTING
 from gpu.layout.pixel_layers import SPLAT_BYTES
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
@@ -98,6 +98,7 @@ def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
     where samples follow what was found, nor where surfaces become rough on the way, nor in pictures that a kernel
     cannot bind as a whole."""
     able = not settings.adaptive and settings.filter_glossy == 0 and settings.width * settings.height <= MOST_SPLATTED
+    able = able and "HAS_MEDIA" not in raised  # no path of light turns where there is no surface
     flag = {"light": "HAS_CAUSTICS", "auto": "HAS_SHARP_CAUSTICS"}.get(settings.caustics)
     return able and flag is not None and flag in raised
 
@@ -121,11 +122,15 @@ def looped(scene: SceneArrays) -> dict[str, int]:
     return {f"looped_{records}": looped_count(scene, kind) for kind, records in SHAPES.items()}
 
 
+# The defines of a kernel that shows what others are compiled for. Its rays begin a new walk down the tree after each
+# layer that they pass: in a kernel with every kind of shape, one walk past all layers takes LLVM 160 s longer.
+SOON: dict[str, object] = {"OPACITY_WALK": 0, "SHADE_ONCE": 1}
+
+
 def loops_from_uniforms() -> dict[str, object]:
-    """The defines of a kernel that reads from the uniforms how many turns its loops make. Its rays begin a new walk
-    down the tree after each layer that they pass: in a kernel with every kind of shape, one walk past all layers
-    takes LLVM 160 s longer to compile."""
-    return {_loop(name): f"uniforms.looped_{SHAPES[kind]}" for name, kind in COUNTS.items()} | {"OPACITY_WALK": 0}
+    """The defines of a kernel that reads from the uniforms how many turns its loops make."""
+    turns: dict[str, object] = {_loop(name): f"uniforms.looped_{SHAPES[kind]}" for name, kind in COUNTS.items()}
+    return turns | SOON
 
 
 def counts(scene: SceneArrays) -> dict[str, object]:
@@ -144,6 +149,12 @@ def _quad_lamp(scene: SceneArrays) -> int:
     """The index of the only emitting quad, where there is one and it stands in the kernel's loop; else -1."""
     lamps = np.flatnonzero(scene.quads["light"] != layout.NONE)
     return int(lamps[0]) if len(lamps) == 1 and lamps[0] < looped_count(scene, ShapeKind.QUAD) else -1
+
+
+def _shades_once(raised: frozenset[str]) -> bool:
+    """Whether the BSDF's code is so long that a kernel should have it once, for lamps and for the path's own
+    direction: with ten models LLVM then takes 11 s instead of 28, with a film 12 instead of 32."""
+    return "HAS_FILM" in raised or len([m for m in FLAGGED if m.lobes_flag in raised]) > 3
 
 
 def defines(
@@ -174,4 +185,5 @@ def defines(
     out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
     out["LOBE_CHOICE"] = 0
     out["OPACITY_WALK"] = 1
+    out["SHADE_ONCE"] = int(_shades_once(raised))
     return out

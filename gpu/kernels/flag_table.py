@@ -12,7 +12,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
-from gpu.kernels import caustics, textures_glsl
+from gpu.kernels import caustics, media, textures_glsl
 from gpu.kernels.deltas import filmed, goes_straight, mirrors, transmits
 from gpu.kernels.flag import ANYWHERE, Asks, Flag
 from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
@@ -116,11 +116,6 @@ def _spreads(s: SceneArrays, model: Model) -> bool:
     sure = mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
     spared = (sure & transmits(m)).any() and not _normal_mapped(s)
     return bool(given.any() and (not spared or (given & ~sure).any()))
-
-
-def _attenuates(s: SceneArrays) -> bool:
-    m = s.materials
-    return bool((transmits(m) & (m["thin_walled"] == 0) & (m["attenuation_distance"] > 0)).any())
 
 
 def _slot_flags(scene: SceneArrays) -> np.ndarray:
@@ -373,6 +368,9 @@ _ROWS = (
     # They raise no code: `features.defines` asks for caustics where a setting does not forbid them.
     Flag("HAS_CAUSTICS", caustics.may_throw, previewed=_always, of_settings=True),
     Flag("HAS_SHARP_CAUSTICS", caustics.throws, previewed=_always, of_settings=True),
-    Flag("HAS_ATTENUATION", _attenuates, previewed=_any_of(TRANSMITTING)),
+    Flag("HAS_ATTENUATION", media.attenuates, previewed=_any_of(TRANSMITTING)),
+    Flag("HAS_MEDIA", media.fills, in_general=False),
+    Flag("HAS_SCATTERING", media.scatters, alone_with=("HAS_MEDIA",), in_general=False),
+    Flag("HAS_GLOWING_MEDIA", media.glows, alone_with=("HAS_MEDIA",), in_general=False),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

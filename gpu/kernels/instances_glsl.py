@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from gpu import layout
-from gpu.kernels.words_glsl import unpacked
+from gpu.kernels.words_glsl import fetched, unpacked
 from gpu.layout import Instance, ShapeKind, bindings
 
 UNIFORMS = ("node_first", "instance_shift")  # the last members of `layout.Uniforms`, which only these kernels have
-GROUPS = Instance.words // 4
 
 
 def text() -> str:
     """The struct, its loader, and the number of an instance in the id of a hit."""
     members = " ".join(f"{kind.glsl} {name};" for name, kind in Instance.members.items())
-    words = "\n".join(
-        f"    uint a{k} = i * {GROUPS}u + {k}u;\n"
-        f"    uvec4 w{k} = texelFetch(instance_texels, ivec2(a{k} & {bindings.TEXELS_A_ROW - 1}u,"
-        f" a{k} / {bindings.TEXELS_A_ROW}u), 0);"
-        for k in range(GROUPS)
-    )
     return f"""#if HAS_INSTANCES
 const uint SHAPE_INSTANCE = {int(ShapeKind.INSTANCE)}u;
 const uint INSTANCED = {layout.INSTANCED}u;
 struct Instance {{ {members} }};
 layout(binding = {bindings.INSTANCES_TEXTURE}) uniform usampler2D instance_texels;
 Instance instance_load(uint i) {{
-{words}
+{fetched("instance_texels", Instance)}
     return Instance({unpacked(Instance, 4)});
 }}
 #endif"""

@@ -4,7 +4,7 @@ read no scene include the constants alone, `layout_constants.glsl`: drivers coun
 from __future__ import annotations
 
 from gpu import layout
-from gpu.kernels import instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
+from gpu.kernels import bodies_glsl, instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
 from gpu.kernels.words_glsl import unpacked
 from gpu.layout import CameraKind, LightKind, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, Slot
@@ -154,7 +154,7 @@ def text() -> str:
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     parts = [constants(), *structs, *loaders, nodes, _uniforms(), instances_glsl.text(), textures_glsl.text()]
-    parts += [models_glsl.predicates(), microfacets_glsl.text(), measured_glsl.text()]
+    parts += [bodies_glsl.text(), models_glsl.predicates(), microfacets_glsl.text(), measured_glsl.text()]
     return "\n".join(parts)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from gpu.arrays import TextureArrays
-from gpu.kernels.words_glsl import unpacked
+from gpu.kernels.words_glsl import fetched, unpacked
 from gpu.layout import ShapeSpace, bindings, texture_records
 from gpu.layout.record import Record
 from gpu.layout.texture_records import TextureRecipe, TextureSlot
 
-RECIPE_GROUPS, SPACE_GROUPS = TextureRecipe.words // 4, ShapeSpace.words // 4
+RECIPE_GROUPS = TextureRecipe.words // 4
 
 
 def groups(textures: TextureArrays) -> int:
@@ -40,11 +40,6 @@ def _struct(record: type[Record]) -> str:
 def text() -> str:
     """The structs and their loaders."""
     words = "\n".join(f"    uvec4 w{j} = material_words[first + {j}u];" for j in range(RECIPE_GROUPS))
-    texels = "\n".join(
-        f"    uvec4 w{j} = texelFetch(space_texels, ivec2((at + {j}u) & {bindings.TEXELS_A_ROW - 1}u,"
-        f" (at + {j}u) / {bindings.TEXELS_A_ROW}u), 0);"
-        for j in range(SPACE_GROUPS)
-    )
     return f"""#if HAS_NOISES || HAS_RAMPS
 {_struct(TextureRecipe)}
 uint texture_recipe_first(uint i, uint k) {{
@@ -64,8 +59,7 @@ vec4 texture_stop_load(uint i, uint k, uint stop) {{
 {_struct(ShapeSpace)}
 layout(binding = {bindings.SPACES_TEXTURE}) uniform usampler2D space_texels;
 ShapeSpace shape_space_load(uint i) {{
-    uint at = {SPACE_GROUPS}u * i;
-{texels}
+{fetched("space_texels", ShapeSpace)}
     return ShapeSpace({unpacked(ShapeSpace, 4)});
 }}
 #endif"""

@@ -68,6 +68,7 @@ INSTANCES_TEXTURE = 14  # records in a texture, as all storage buffers are taken
 MICROFACETS_TEXTURE = 5  # records of the model `microfacet` and their tables
 MEASURED_TEXTURE = 15  # records of the model `measured` and their tables
 SPACES_TEXTURE = 6  # the shapes' own coordinates
+BODIES_TEXTURE = 17  # what fills the shapes
 ENERGY_TEXTURES = {
     "albedo": 1,
     "stretched": 2,

@@ -200,6 +200,16 @@ class ShapeSpace(Record):
     move_z: f32
 
 
+class Body(Record):
+    """What fills a shape, besides what its material absorbs. After the bodies of all shapes comes what is outside."""
+
+    extinction: vec3  # 1/m
+    g: f32  # mean cosine of scattering
+    scattering: vec3  # 1/m
+    priority: f32
+    emission: vec3  # W / (m^3 sr)
+
+
 class TriangleNormals(Record):
     slot = Slot.TRIANGLE_NORMALS
     n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)

@@ -48,7 +48,7 @@ def defines(raised: frozenset[str] | None = None, arrays: SceneArrays | None = N
     if raised is None or arrays is None:
         return features.defines(flags(), clamped) | features.loops_from_uniforms()
     counts = features.counts(arrays) | {"LIGHT_COUNT": 0, "QUAD_LAMP": -1}
-    return features.defines(raised, clamped, counts) | {"OPACITY_WALK": 0}
+    return features.defines(raised, clamped, counts) | features.SOON
 
 
 def settings_for(settings: RenderSettings) -> RenderSettings | None:

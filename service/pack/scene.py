@@ -14,6 +14,7 @@ from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets, ImageData, MeasuredData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import assemble
+from service.pack.geometry.bodies import bodies
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
@@ -109,6 +110,7 @@ def pack(
         environment=sky.arrays,
         textures=textures,
         spaces=shape_spaces(scene, built.origin),
+        bodies=bodies(scene),
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
     odd = odd_meshes(built.meshes.odd, materials, emissive)

@@ -2,6 +2,8 @@
 
 document        the document, and how it is parsed
 camera, light, shape, environment, material, texture, transform   its parts
+medium          what fills a closed shape, or all space outside of bodies
+half_space      the albedo of single scattering that gives much of a medium its colour
 procedural      textures that are computed: noise and ramps
 settings        the settings of a render
 named           what a person can give a name

@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from service.scene.base import Model, hint, refusal
+from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.medium import Medium
 from service.scene.numbers import BRIGHTEST, Degrees, Factor, Fraction
 from service.scene.photometry import Radiance
 
@@ -30,6 +31,22 @@ class _Surroundings(Model):
         bool,
         hint("Show as background", "Off: it lights the scene, but the camera sees black with alpha 0."),
     ] = True
+    medium: Annotated[
+        Medium | None, OMITTABLE, hint("Medium", "What fills all space outside of bodies: fog, or the sea.")
+    ] = None
+
+    @model_validator(mode="after")
+    def _shines_finitely(self) -> Self:
+        if self.medium is not None:
+            extinction, _ = self.medium.coefficients()
+            for i, shines in enumerate(self.medium.emission):
+                if shines > 0 and extinction[i] <= 0:
+                    channel = ("red", "green", "blue")[i]
+                    raise refusal(
+                        f"must be 0 in a channel without absorption and scattering, as endless space would shine "
+                        f"endlessly ({channel})", at="/medium/emission",
+                    )  # fmt: skip
+        return self
 
 
 class ConstantEnvironment(_Surroundings):

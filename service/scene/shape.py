@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.medium import Medium
 from service.scene.named import Name, Named
 from service.scene.number_arrays import Colors, Coordinates, Directions, Points, Triangles, first_beyond
 from service.scene.numbers import Direction, Point, PositiveLength
@@ -29,7 +30,20 @@ class _Placed(Named):
     ] = True
 
 
-class SphereShape(_Placed):
+class _Body(_Placed):
+    """A shape that may have an inside."""
+
+    priority: Annotated[
+        int,
+        Field(ge=-100, le=100),
+        hint("Priority", "Where bodies that light passes through overlap, the highest one is there.", unit=""),
+    ] = 0
+    medium: Annotated[Medium | None, OMITTABLE, hint("Medium", "What fills it, behind a surface that transmits.")] = (
+        None
+    )
+
+
+class SphereShape(_Body):
     """An exact sphere, not a mesh."""
 
     type: Literal["sphere"]
@@ -71,7 +85,7 @@ class DiskShape(_Placed):
     ]
 
 
-class CylinderShape(_Placed):
+class CylinderShape(_Body):
     """A cylinder between two flat caps, or an open tube."""
 
     type: Literal["cylinder"]
@@ -85,7 +99,7 @@ class CylinderShape(_Placed):
     ] = True
 
 
-class BoxShape(_Placed):
+class BoxShape(_Body):
     """A box along the axes; a transform turns it."""
 
     type: Literal["box"]
@@ -103,7 +117,7 @@ class BoxShape(_Placed):
         return self
 
 
-class MeshShape(_Placed):
+class MeshShape(_Body):
     """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
 
     model_config = ConfigDict(

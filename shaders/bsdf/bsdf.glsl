@@ -69,8 +69,13 @@ Surface surface_make(Material m, vec2 tangent) {
     return s;
 }
 
+#include "bsdf/phase.glsl"
+
 // The f of the models' own functions lacks the cosine.
 Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
+#if HAS_SCATTERING
+    if (s.in_medium) return phase_eval(s.g, wo, wi);
+#endif
 #if HAS_TRANSMISSION
     bool below = model_transmits(s.model) && wi.z < 0.0;
     if (wo.z <= 0.0 || (wi.z <= 0.0 && !below)) return Scatter(vec3(0.0), 0.0);
@@ -86,7 +91,13 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
     return r;
 }
 
-LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) { return models_sample(s, wo, u_lobe, u); }
+LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    LobeSample r = models_sample(s, wo, u_lobe, u);
+#if HAS_SCATTERING
+    if (s.in_medium) r = bsdf_rough_sample(phase_sample(s.g, u));
+#endif
+    return r;
+}
 
 // Samples uniformly over the hemisphere, or over the sphere where the material transmits; perfectly specular lobes are
 // sampled as always. Of a uniform direction `scatter` has only the density.
@@ -107,6 +118,12 @@ LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
         }
 #endif
         r.scatter.pdf *= 1.0 - models_delta_chance(s, wo);
+#if HAS_SCATTERING
+        if (s.in_medium) {
+            r.wi = sampling_sphere(u);
+            r.scatter.pdf = 0.25 * INV_PI;
+        }
+#endif
     }
     return r;
 }

@@ -65,6 +65,10 @@ struct Surface {
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame
 #endif
+#if HAS_SCATTERING
+    bool in_medium; // a particle scatters: by its phase function
+    float g;        // mean cosine
+#endif
 #include "model_members.glsl"
 };
 
@@ -111,6 +115,10 @@ Surface surface_plain(Material m) {
     s.clearcoat = 0.0;
     s.alpha_coat = 1.0;
     s.tangent = vec2(1.0, 0.0);
+#if HAS_SCATTERING
+    s.in_medium = false;
+    s.g = 0.0;
+#endif
     return s;
 }
 
@@ -120,6 +128,9 @@ bool surface_is_broad(Surface s) {
     bool narrow = s.metallic > 0.5 && s.roughness < 0.25;
 #if HAS_TRANSMISSION
     narrow = narrow || (model_transmits(s.model) && s.transmission > 0.5);
+#endif
+#if HAS_SCATTERING
+    narrow = narrow && !s.in_medium;
 #endif
     return !narrow;
 }

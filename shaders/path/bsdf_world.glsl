@@ -1,11 +1,15 @@
 // The BSDF in world space, folded by normal maps (path/normal_map.glsl), and sampled as the estimator requires.
 
-Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
-#if HAS_NORMAL_MAPS
-    return normal_map_eval(s, here, wi_w);
-#else
-    return bsdf_eval(s, here.wo, basis_to_local(here.basis, wi_w));
-#endif
+// A direction for which the BSDF is asked: that of a lamp, or the one in which the path goes on.
+struct Asked {
+    vec3 d;          // in world space
+    vec3 wi;         // in the shading frame, where nothing is folded
+    bool goes_on;    // the path has drawn it ...
+    LobeSample lobe; // ... by this sample
+};
+
+Asked bsdf_ask(Interaction here, vec3 d) {
+    return Asked(d, basis_to_local(here.basis, d), false, bsdf_rough_sample(vec3(0.0)));
 }
 
 // Samples a direction in the shading frame as the estimator does.
@@ -17,16 +21,16 @@ LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 }
 
-// The value and the density of the world direction d that `lobe` was turned into.
-Scatter bsdf_scatter_world(Surface s, Interaction here, LobeSample lobe, vec3 d) {
+// The value and the density of a direction.
+Scatter bsdf_eval_world(Surface s, Interaction here, Asked asked) {
 #if HAS_NORMAL_MAPS
-    Scatter scatter = normal_map_eval(s, here, d);
+    Scatter scatter = normal_map_eval(s, here, asked.d);
 #else
-    Scatter scatter = bsdf_eval(s, here.wo, lobe.wi);
+    Scatter scatter = bsdf_eval(s, here.wo, asked.wi);
 #endif
 #if ESTIMATOR == ESTIMATOR_UNIFORM
-    scatter.pdf = lobe.scatter.pdf;
+    if (asked.goes_on) scatter.pdf = asked.lobe.scatter.pdf;
 #endif
-    if (lobe.is_delta) scatter = lobe.scatter;
+    if (asked.goes_on && asked.lobe.is_delta) scatter = asked.lobe.scatter;
     return scatter;
 }

@@ -32,7 +32,7 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
         if (path.alive) {
             here = interaction_make(path, m);
 #if HAS_MIRRORS
-            taken = material_is_delta(m) && !here.mapped;
+            taken = material_is_delta(m) && !here.mapped && !scatter_was(path);
             if (taken) delta_chain_step(here, m, rng, path);
 #endif
         }

@@ -69,13 +69,14 @@ bool direct_arrives(Path path, LightSample light, Medium medium, inout vec3 c) {
     return shadow_arrives(o, d, t, skip, medium, uniforms.max_bounces - 1u - path.bounce, c);
 }
 
-// Adds the light of one sample of one light.
-void direct_add(Surface s, Interaction here, Material m, LightContext context, float share, Sampler rng,
-                inout Path path) {
-    uint pair = sobol_bounce_pair(path.bounce);
-    uint pick_bits = sobol_bits(rng, pair + PAIR_CHOICE).x;
-    LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
-    Scatter f = dispersion_eval(s, here, m, path.hues, light.wi);
+// A sample of the lights, which of `share` may be the turn-th.
+LightSample direct_sample(LightContext context, Sampler rng, uint bounce) {
+    uint pair = sobol_bounce_pair(bounce);
+    return lights_sample(context, sobol_bits(rng, pair + PAIR_CHOICE).x, sobol_bits(rng, pair + PAIR_LIGHT));
+}
+
+// Adds the light of one sample of one light, towards which the BSDF is f.
+void direct_add(Surface s, Interaction here, LightSample light, Scatter f, float share, inout Path path) {
     float across = dot(light.wi, here.front), side = dot(light.wi, here.facing);
     bool counts = direct_counts(light, path.hit.id) && (here.mapped || terminator_agrees(path.at, light.wi, side, across))
         && max_component(f.f * light.radiance) > 0.0;
@@ -86,18 +87,4 @@ void direct_add(Surface s, Interaction here, Material m, LightContext context, f
         Medium medium = interaction_medium(across < 0.0, path.medium, here.beyond);
         if (direct_arrives(path, light, medium, c)) path.radiance += path_clamp(c, path.bounce > path.passed) * share;
     }
-}
-
-// Adds the light that the surface receives from lights and sends on along the path.
-void direct_lighting(Surface s, Interaction here, Material m, LightContext context, float share, Sampler rng,
-                     inout Path path) {
-#if HAS_LIGHTS
-#if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
-    uint doublings = direct_doublings(s, path.bounce), turn = 0u;
-    do direct_add(s, here, m, context, share, sobol_part(rng, turn, doublings), path);
-    while (++turn < (1u << doublings));
-#else
-    direct_add(s, here, m, context, share, rng, path);
-#endif
-#endif
 }

@@ -25,8 +25,9 @@ Scatter dispersion_delta(Surface s, vec3 wo, LobeSample lobe) {
 }
 #endif
 
-// The BSDF towards wi_w, and the density of that direction, whichever channel leads; s is the leading one's surface.
-Scatter dispersion_eval(Surface s, Interaction here, Material m, Hues hues, vec3 wi_w) {
+// The BSDF in a direction, and its density, whichever channel leads; s is the leading one's surface. Where the path goes
+// on in it, so do its hues.
+Scatter dispersion_eval(Surface s, Interaction here, Material m, Asked asked, inout Hues hues) {
 #if HAS_DISPERSION
     Scatter sum = Scatter(vec3(0.0), 0.0);
     vec3 pdfs = vec3(0.0);
@@ -36,42 +37,19 @@ Scatter dispersion_eval(Surface s, Interaction here, Material m, Hues hues, vec3
         uint channel = (hues.leads + j) % 3u;
         Surface c = s;
         if (j > 0u) c = dispersion_surface(here, m, hues, channel);
-        Scatter f = bsdf_eval_world(c, here, wi_w);
-        if (parts) dispersion_take(channel, f, sum, pdfs);
-        else sum = f;
-        more = parts && ++j < 3u;
-    } while (more);
-    if (parts) sum.pdf = dot(pdfs, hues.shares) / 3.0;
-    return sum;
-#else
-    return bsdf_eval_world(s, here, wi_w);
-#endif
-}
-
-// Likewise for the direction d that the leading channel's `lobe` was turned into; the hues go that way.
-Scatter dispersion_scatter(Surface s, Interaction here, Material m, LobeSample lobe, vec3 d, inout Hues hues) {
-#if HAS_DISPERSION
-    Scatter sum = Scatter(vec3(0.0), 0.0);
-    vec3 pdfs = vec3(0.0);
-    bool parts = hues_part(m), more;
-    uint j = 0u;
-    do {
-        uint channel = (hues.leads + j) % 3u;
-        Surface c = s;
-        if (j > 0u) c = dispersion_surface(here, m, hues, channel);
-        Scatter f = bsdf_scatter_world(c, here, lobe, d);
-        if (j > 0u && lobe.is_delta) f = dispersion_delta(c, here.wo, lobe);
+        Scatter f = bsdf_eval_world(c, here, asked);
+        if (j > 0u && asked.goes_on && asked.lobe.is_delta) f = dispersion_delta(c, here.wo, asked.lobe);
         if (parts) dispersion_take(channel, f, sum, pdfs);
         else sum = f;
         more = parts && ++j < 3u;
     } while (more);
     if (parts) {
         sum.pdf = dot(pdfs, hues.shares) / 3.0;
-        if (sum.pdf > 0.0) hues.shares *= pdfs / sum.pdf;
+        if (asked.goes_on && sum.pdf > 0.0) hues.shares *= pdfs / sum.pdf;
     }
     return sum;
 #else
-    return bsdf_scatter_world(s, here, lobe, d);
+    return bsdf_eval_world(s, here, asked);
 #endif
 }
 

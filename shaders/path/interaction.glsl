@@ -11,21 +11,27 @@ struct Interaction {
     vec3 coat;     // the coat's own normal, as the viewer sees it; only with HAS_COAT_NORMALS
     bool transmits;
     Medium beyond; // the medium on the other side
+#if HAS_SCATTERING
+    bool in_medium; // there is no surface: a particle of a medium scatters
+    float g;
+#endif
 };
+
+#include "path/scatter.glsl"
 
 // Finds the bodies on both sides of the surface.
 void interaction_media(Material m, inout Interaction here, inout Path path) {
 #if HAS_ATTENUATION
-    vec3 rate = surface_attenuation(m);
-    bool clear = here.transmits && !material_is_thin(m);
+    Medium body = medium_body(m, path.at.shape);
+    bool clear = here.transmits && !material_is_thin(m) && !scatter_was(path);
     if (clear && here.behind && path.medium.depth < 0.5) {
         // This is the back of an open sheet: the path counts as inside a body since it began.
-        path.medium = medium_entered(path.medium, rate);
+        path.medium = medium_entered(path.medium, body);
         if (path.bounce == 0u) path.throughput = medium_share(path.medium, path.hit.t);
     }
     here.beyond = path.medium;
-    if (clear && here.behind) here.beyond = medium_left(path.medium, rate);
-    if (clear && !here.behind) here.beyond = medium_entered(path.medium, rate);
+    if (clear && here.behind) here.beyond = medium_left(path.medium, body);
+    if (clear && !here.behind) here.beyond = medium_entered(path.medium, body);
 #else
     here.beyond = path.medium;
 #endif
@@ -80,13 +86,15 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
     here.transmits = material_transmits(m);
-    hues_meet(m, path.hues);
+    if (!scatter_was(path)) hues_meet(m, path.hues);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     here.fold = here.front;
-    bool lifts = terminator_begin(here.front, here.behind, here.transmits || medium_around(path.medium), path.at);
+    bool level = here.transmits || medium_around(path.medium) || scatter_was(path);
+    bool lifts = terminator_begin(here.front, here.behind, level, path.at);
     if (lifts) here.fold = smooth_w;
     here.facing = here.mapped ? here.fold : here.basis.z; // a folded lobe reaches all directions in front
+    scatter_interaction(path, here);
     return here;
 }
 
@@ -97,6 +105,7 @@ Surface interaction_surface(Interaction here, Material m) {
     s.coat = basis_make(basis_to_local(here.basis, here.coat));
 #endif
     models_face(here.wo, here.behind, s);
+    scatter_surface(here, s);
     return s;
 }
 

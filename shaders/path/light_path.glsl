@@ -41,7 +41,8 @@ void light_path_connect(Path path, SurfacePoint at, vec3 flux, Medium camera_med
     Interaction here = interaction_make(view, m);
     Surface s = interaction_surface(here, hues_leading(m, path.hues));
     vec3 wi = -path.d;
-    Scatter f = dispersion_eval(s, here, m, path.hues, wi);
+    Hues hues = path.hues;
+    Scatter f = dispersion_eval(s, here, m, bsdf_ask(here, wi), hues);
     float across = dot(wi, here.front), side = dot(wi, here.facing);
     bool counts = link.weight > 0.0 && (here.mapped || terminator_agrees(view.at, wi, side, across));
 #if HAS_HIDDEN_SHAPES
@@ -64,7 +65,9 @@ void light_path_step(Interaction here, Material m, Sampler rng, inout Path path)
 #endif
     if (!taken) {
         Surface s = interaction_surface(here, hues_leading(m, path.hues));
-        BsdfSample next = path_sample(s, here, m, rng, path);
+        Asked asked;
+        BsdfSample next = path_sample(s, here, rng, path, asked);
+        path_weigh(dispersion_eval(s, here, m, asked, path.hues), next);
         next.valid = next.valid && next.is_delta;
         path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
         path_extend(next, 1.0, s, rng, path);
@@ -74,12 +77,8 @@ void light_path_step(Interaction here, Material m, Sampler rng, inout Path path)
 
 Path light_path_begin(Emission e, Sampler rng) {
     budget_begin();
-#if HAS_ATTENUATION
-    Medium medium = Medium(vec3(0.0), 0.0);
+    Medium medium = medium_outside();
     if (e.placed) medium = medium_at(e.o);
-#else
-    Medium medium = Medium(0.0);
-#endif
     Path path = path_begin(rng, e.o, e.d, medium, 0u);
     path.at.flat_id = e.skip;
     path.bounce = 1u;

@@ -1,9 +1,14 @@
-// Bodies that absorb light. Their rates add up, so that nested or overlapping bodies may be entered and left in any
-// order; a ray that is in two bodies loses light to both.
+// What is around a ray. The rates of bodies add up, so that nested or overlapping bodies may be entered and left in any
+// order; a ray that is in two bodies loses light to both. Outside of bodies is what fills all other space.
 struct Medium {
 #if HAS_ATTENUATION
-    vec3 rate;   // of attenuation, 1/m: the sum over all bodies around the ray
+    vec3 rate;   // of extinction, 1/m: the sum over all bodies around the ray
     float depth; // the number of these bodies
+#if HAS_MEDIA
+    vec3 scattering; // 1/m
+    float forward;   // the mean cosine of scattering, times the mean of its rate
+    vec3 emission;   // W / (m^3 sr)
+#endif
 #else
     float unused; // a struct must have a member; every kernel passes media on
 #endif
@@ -33,12 +38,90 @@ const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below passes at mo
 // The direction of the search, off the camera's axes, where meshes tend to have their edges.
 const vec3 MEDIUM_SEARCH = vec3(0.1371, 0.0713, -1.0);
 
-Medium medium_entered(Medium m, vec3 rate) { return Medium(m.rate + rate, m.depth + 1.0); }
+Medium medium_none() {
+    Medium m;
+    m.rate = vec3(0.0);
+    m.depth = 0.0;
+#if HAS_MEDIA
+    m.scattering = m.emission = vec3(0.0);
+    m.forward = 0.0;
+#endif
+    return m;
+}
 
-// Leaving the last body leaves no rate at all: a texture may have given the body another rate where it was entered.
-Medium medium_left(Medium m, vec3 rate) {
-    if (m.depth > 1.5) return Medium(max(m.rate - rate, vec3(0.0)), m.depth - 1.0);
-    return Medium(vec3(0.0), 0.0);
+#if HAS_MEDIA
+// Adds what fills a body, `times` times; the body 0 is all space outside of shapes.
+void medium_fill(uint body, float times, inout Medium m) {
+    Body b = body_load(body);
+    m.rate += times * b.extinction;
+    m.scattering += times * b.scattering;
+    m.forward += times * b.g * dot(b.scattering, vec3(1.0 / 3.0));
+    m.emission += times * b.emission;
+}
+#endif
+
+// What is outside of all bodies.
+Medium medium_outside() {
+    Medium m = medium_none();
+#if HAS_MEDIA
+    medium_fill(0u, 1.0, m);
+#endif
+    return m;
+}
+
+// A body of that material and shape.
+Medium medium_body(Material material, uint shape) {
+    Medium m = medium_none();
+    m.rate = surface_attenuation(material);
+    m.depth = 1.0;
+#if HAS_MEDIA
+    medium_fill(1u + (shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN)), 1.0, m);
+#endif
+    return m;
+}
+
+Medium medium_sum(Medium a, Medium b, float times) {
+    a.rate += times * b.rate;
+    a.depth += times * b.depth;
+#if HAS_MEDIA
+    a.scattering += times * b.scattering;
+    a.forward += times * b.forward;
+    a.emission += times * b.emission;
+#endif
+    return a;
+}
+
+// Without what rounding leaves of bodies that were left.
+Medium medium_real(Medium m) {
+    m.rate = max(m.rate, vec3(0.0));
+#if HAS_MEDIA
+    m.scattering = max(m.scattering, vec3(0.0));
+    m.emission = max(m.emission, vec3(0.0));
+#endif
+    return m;
+}
+
+Medium medium_entered(Medium m, Medium body) {
+#if HAS_MEDIA
+    if (m.depth < 0.5) return body;
+#endif
+    return medium_sum(m, body, 1.0);
+}
+
+// Leaving the last body leaves nothing of it: a texture may have given the body another rate where it was entered.
+Medium medium_left(Medium m, Medium body) {
+    if (m.depth > 1.5) return medium_real(medium_sum(m, body, -1.0));
+    return medium_outside();
+}
+
+// What two searches both find.
+Medium medium_least(Medium a, Medium b) {
+#if HAS_MEDIA
+    if (a.depth < b.depth) return a;
+    return b;
+#else
+    return Medium(min(a.rate, b.rate), min(a.depth, b.depth));
+#endif
 }
 
 // The medium around the place where a camera's ray begins: that of the bodies whose surface a straight line leaves more often than it enters.
@@ -47,7 +130,7 @@ Medium medium_left(Medium m, vec3 rate) {
 Medium medium_at(vec3 from) {
     vec3 d = normalize(camera_to_world(MEDIUM_SEARCH));
     vec3 o = from;
-    Medium sum = Medium(vec3(0.0), 0.0), first = sum;
+    Medium sum = medium_none(), first = sum;
     vec3 walls = vec3(0.0);
     uint skip = NONE, layer = 0u, side = 0u;
     bool more;
@@ -62,17 +145,19 @@ Medium medium_at(vec3 from) {
 #endif
         if (counts) {
             float crossing = dot(at.ng, d) > 0.0 ? 1.0 : -1.0;
-            vec3 rate = surface_attenuation(m), wall = step(MEDIUM_WALL, rate);
-            sum.rate += crossing * (1.0 - wall) * rate;
+            Medium body = medium_body(m, at.shape);
+            vec3 wall = step(MEDIUM_WALL, body.rate);
+            body.rate *= 1.0 - wall;
+            sum = medium_sum(sum, body, crossing);
             walls += crossing * wall;
-            sum.depth += crossing;
         }
         if (more) {
             o = shapes_leave(at, d);
             skip = at.flat_id;
         } else {
-            sum.rate = sum.depth > 0.5 ? max(sum.rate, vec3(0.0)) + MEDIUM_WALL * max(walls, vec3(0.0)) : vec3(0.0);
-            sum.depth = max(sum.depth, 0.0);
+            sum = medium_real(sum);
+            sum.rate += MEDIUM_WALL * max(walls, vec3(0.0));
+            if (sum.depth < 0.5) sum = medium_outside();
             more = side == 0u && sum.depth > 0.5 && budget_lasts();
             if (side == 0u) first = sum;
             side++;
@@ -80,14 +165,15 @@ Medium medium_at(vec3 from) {
             d = -d;
             skip = NONE;
             if (more) {
-                sum = Medium(vec3(0.0), 0.0);
+                sum = medium_none();
                 walls = vec3(0.0);
             }
         }
         layer++;
     } while (more);
-    return Medium(min(first.rate, sum.rate), min(first.depth, sum.depth));
+    return medium_least(first, sum);
 }
 #else
-Medium medium_at(vec3 from) { return Medium(0.0); }
+Medium medium_outside() { return Medium(0.0); }
+Medium medium_at(vec3 from) { return medium_outside(); }
 #endif

@@ -20,6 +20,7 @@
 #include "path/path_sample.glsl"
 #include "path/shadow.glsl"
 #include "path/direct.glsl"
+#include "path/path_shade.glsl"
 #include "path/path_trace.glsl"
 #include "path/delta_chain.glsl"
 
@@ -71,8 +72,7 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
             Surface s = interaction_surface(here, hues_leading(m, path.hues));
             LightContext lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);
-            direct_lighting(s, here, m, lit, share, rng, path);
-            BsdfSample next = path_sample(s, here, m, rng, path);
+            BsdfSample next = path_shade(s, here, m, lit, share, rng, path);
             if (!next.straight) path.lit = lit;
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);

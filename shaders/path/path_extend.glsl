@@ -26,6 +26,9 @@ struct Path {
     // unchanged; the factor is not part of the throughput, so that roulette does not see it.
     float eta_scale;
     Medium medium;
+#if HAS_SCATTERING
+    bool in_medium; // the ray ends at a particle (path/scatter.glsl)
+#endif
     Cone cone;
     Hues hues;
 #if HAS_FILTER_GLOSSY

@@ -1,6 +1,7 @@
 // Adds the light that the surface receives from lights and sends on along the path; returns the direction in which the path
 // goes on. With SHADE_ONCE the BSDF is asked for all directions at one place of the program: drivers inline each call, so
-// that LLVM takes half the time for a kernel with films. A sample takes up to a tenth more time where the BSDF is simple.
+// that LLVM takes less than half the time for a kernel with films or with many models. A sample takes up to a tenth more
+// time where the BSDF is simple.
 BsdfSample path_shade(Surface s, Interaction here, Material m, LightContext context, float share, Sampler rng,
                       inout Path path) {
     Asked own;

@@ -14,7 +14,7 @@ void path_add_emission(inout Path path) {
 #endif
 #if HAS_AMBIENT
     vec3 ambient = found_light_ambient(path.at, path.d, path.cone) * path.eta_scale;
-    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
+    if (path.hit.id != NONE && !scatter_was(path)) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
 #endif
 }
 
@@ -23,8 +23,8 @@ void path_trace(Sampler rng, inout Path path) {
     path.hit = transparency_nearest(path.o, path.d, path.at.flat_id, path.bounce, rng, path.at);
     path.alive = path.alive && budget_lasts();
     if (!path.alive) path.hit.id = NONE; // the last surface has ended it, or this ray its budget
+    scatter_travel(rng, path);
     bool met = path.hit.id != NONE;
-    path.throughput *= medium_share(path.medium, path.hit.t);
     path.cone = cone_after(path.cone, path.hit.t);
     path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
     path.alive = met && path.bounce < uniforms.max_bounces;

@@ -53,9 +53,9 @@ vec3 straight_share(SurfacePoint at, vec3 d, inout Medium medium) {
     vec3 share = models_straight(here.wo, here.behind, s);
 #if HAS_ATTENUATION
     if (!material_is_thin(m)) {
-        vec3 rate = surface_attenuation(m);
-        if (here.behind) medium = medium_left(medium, rate);
-        else medium = medium_entered(medium, rate);
+        Medium body = medium_body(m, at.shape);
+        if (here.behind) medium = medium_left(medium, body);
+        else medium = medium_entered(medium, body);
     }
 #endif
     return straight_goes(s, at) ? share : vec3(0.0);

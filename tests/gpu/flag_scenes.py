@@ -75,6 +75,11 @@ def made_of(material: Doc, *shapes: Doc, **more: Any) -> Doc:
     return lit(*(shapes or [ball("m"), FLOOR]), materials={"m": material}, **more)
 
 
+def filled(medium: Doc) -> Doc:
+    clear = {"type": "principled", "transmission": 1, "roughness": 0.3, "ior": 1.2}
+    return made_of(clear, {**ball("m"), "medium": medium}, FLOOR)
+
+
 def textured(material: Doc, *shapes: Doc, **texture: Any) -> Doc:
     image = {} if "type" in texture else {"asset": "bytes"}
     return made_of({"type": "principled", **material}, *shapes, textures={"t": {**image, **texture}})
@@ -151,4 +156,7 @@ SCENES: dict[str, Doc] = {
     "THIN_WALLS": made_of({**GLASS, "thin_walled": True}),
     "STRAIGHT": made_of({**GLASS, "thin_walled": True, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
+    "MEDIA": filled({"absorption": 1}),
+    "SCATTERING": filled({"scattering": 2}),
+    "GLOWING_MEDIA": filled({"emission": 1}),
 }  # fmt: skip

@@ -81,8 +81,8 @@ def test_what_loses_nothing_is_white_in_a_furnace(gpu: Renderer, material: str, 
 
 
 def test_what_shines_and_absorbs_as_much_is_as_bright_as_the_furnace(gpu: Renderer) -> None:
-    """Kirchhoff: emission of absorption times the radiance around, which in a body is that outside times the square of
-    its index; among particles that scatter."""
+    """Kirchhoff: emission of absorption times the radiance around, which in a body is that outside times the square
+    of its index; among particles that scatter."""
     medium = {"absorption": 1.0, "scattering": [4, 1, 0], "emission": 1.0, "g": 0.5}
     dense = {**medium, "emission": 1.5**2}
     for shape in (filled(medium), filled(dense, "glass"), {**icosphere("glass", 2), "medium": dense}):
@@ -136,7 +136,8 @@ def test_estimators_agree_in_what_scatters(gpu: Renderer) -> None:
     cloud = {"scattering": 1.5, "absorption": [0.1, 0.2, 0.5], "g": 0.4}
     shapes = [
         filled(cloud), ball("lamp", (0.3, 0, 0), 0.3), ball("lamp", (-2, 2, 1), 0.5),
-        quad("floor", (-4, -1, 4), (8, 0, 0), (0, 0, -8)), filled({"scattering": 5}, "glass", center=(1.8, 0, 0), radius=0.7),
+        quad("floor", (-4, -1, 4), (8, 0, 0), (0, 0, -8)),
+        filled({"scattering": 5}, "glass", center=(1.8, 0, 0), radius=0.7),
     ]  # fmt: skip
     materials = {
         "clear": CLEAR, "glass": {**CLEAR, "ior": 1.5}, "floor": {"type": "diffuse", "albedo": 0.6},

@@ -92,6 +92,23 @@ class MatrixTransform(TypedDict, total=False):
     """16 numbers, row by row; the last row is 0 0 0 1."""
 
 
+class Medium(TypedDict, total=False):
+    """A homogeneous medium, by its coefficients or by the colour and the mean free path that it shows."""
+
+    absorption: list[float] | float | str | dict[str, Any]
+    """The rate at which light is lost, per channel. (1/m, 0 to 1e+09, default [0.0, 0.0, 0.0])"""
+    scattering: list[float] | float | str | dict[str, Any]
+    """The rate at which light turns, per channel. (1/m, 0 to 1e+09, default [0.0, 0.0, 0.0])"""
+    albedo: list[float] | float | str
+    """The colour of much of it; with a radius, in place of absorption and scattering. (0 to 1)"""
+    radius: list[float] | float | str | dict[str, Any]
+    """How far light goes, on average, before something happens to it, per channel. (m, 0 to 1e+09)"""
+    g: float
+    """The mean cosine of scattering: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
+    emission: list[float] | float | str | dict[str, Any]
+    """What each metre of it adds to the radiance along a ray. (W/(m^3 sr), 0 to 1e+20, default [0.0, 0.0, 0.0])"""
+
+
 class Transform(TypedDict, total=False):
     """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
 
@@ -106,6 +123,10 @@ class Transform(TypedDict, total=False):
 class BoxShape(TypedDict, total=False):
     """A box along the axes; a transform turns it."""
 
+    priority: int
+    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    medium: Medium
+    """What fills it, behind a surface that transmits."""
     type: Required[Literal["box"]]
     min: Required[list[float]]
     """The least x, y and z. (m)"""
@@ -145,6 +166,8 @@ class ConstantEnvironment(TypedDict, total=False):
     """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
     """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    medium: Medium
+    """What fills all space outside of bodies: fog, or the sea."""
 
 
 class CubeFaces(TypedDict, total=False):
@@ -179,11 +202,17 @@ class CubemapEnvironment(TypedDict, total=False):
     """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
     """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    medium: Medium
+    """What fills all space outside of bodies: fog, or the sea."""
 
 
 class CylinderShape(TypedDict, total=False):
     """A cylinder between two flat caps, or an open tube."""
 
+    priority: int
+    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    medium: Medium
+    """What fills it, behind a surface that transmits."""
     type: Required[Literal["cylinder"]]
     base: Required[list[float]]
     """The middle of the end where it begins. (m)"""
@@ -315,6 +344,8 @@ class ImageEnvironment(TypedDict, total=False):
     """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
     """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    medium: Medium
+    """What fills all space outside of bodies: fog, or the sea."""
 
 
 class ImageTexture(TypedDict, total=False):
@@ -361,6 +392,10 @@ class MeasuredMaterial(TypedDict, total=False):
 class MeshShape(TypedDict, total=False):
     """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
 
+    priority: int
+    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    medium: Medium
+    """What fills it, behind a surface that transmits."""
     type: Required[Literal["mesh"]]
     asset: str
     """A mesh file: OBJ, PLY, STL or GLB."""
@@ -820,11 +855,17 @@ class SkyEnvironment(TypedDict, total=False):
     """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
     """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    medium: Medium
+    """What fills all space outside of bodies: fog, or the sea."""
 
 
 class SphereShape(TypedDict, total=False):
     """An exact sphere, not a mesh."""
 
+    priority: int
+    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    medium: Medium
+    """What fills it, behind a surface that transmits."""
     type: Required[Literal["sphere"]]
     center: Required[list[float]]
     """The middle of the sphere. (m)"""

@@ -12,6 +12,7 @@ vertex_normals    smooth normals at the corners, and their codes
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
 instances         the choice of shared meshes, and the records of the shapes that show them
+bodies            what fills the shapes, and the space around them
 spaces            the shapes' own coordinates, in which solid textures lie
 scene_bvh         the tree over the scene, and the few shapes that stand in a loop instead
 records           analytic shapes -> records with their bounds

@@ -216,16 +216,18 @@ OpenpbrWeights openpbr_weights(Surface s, vec3 wo) {
 Scatter openpbr_eval(Surface s, vec3 wo, vec3 wi) {
     OpenpbrWeights w = openpbr_weights(s, wo);
     vec4 albedo_i = base_albedo(s, wi);
+    BASE_SHARE lost_i = BASE_SHARE(0.0);
 #if HAS_TRANSMISSION
+    lost_i = base_lost(s, wi, albedo_i);
     if (wi.z < 0.0) {
-        Scatter below = base_eval_below(s, wo, wi, albedo_i, w.base);
+        Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, w.base);
         below.f *= openpbr_layers(s, wo, wi);
         return below;
     }
 #endif
     vec3 wm = normalize(wo + wi);
     vec3 diffuse = openpbr_diffuse_eval(s, wo, wi, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
-    Scatter r = base_eval(s, wo, wi, wm, albedo_i, diffuse, w.base);
+    Scatter r = base_eval(s, wo, wi, wm, albedo_i, lost_i, diffuse, w.base);
     r.f *= openpbr_layers(s, wo, wi);
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS
     if (!s.bare) {

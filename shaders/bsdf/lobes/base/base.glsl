@@ -90,13 +90,16 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
 }
 
 #if HAS_TRANSMISSION
+// What wi loses between the facets, on the side where it is.
+BASE_SHARE base_lost(Surface s, vec3 wi, vec4 albedo_i) { return shares_lost(s, wi, albedo_i, s.inside != (wi.z < 0.0)); }
+
 // Of light that passes the base: f lacks the layers.
-Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BaseWeights w) {
+Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BASE_SHARE lost_i, BaseWeights w) {
 #if !HAS_THIN_WALLS
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
 #endif
     vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
-    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, shares_lost(s), shares_lost(s, wi, albedo_i, !s.inside)));
+    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, shares_lost(s), lost_i));
     float pdf = w.diffuse_below * INV_PI * -wi.z;
 #if HAS_THIN_WALLS
     if (s.is_thin) {
@@ -118,7 +121,7 @@ Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BaseWeights 
 #endif
 
 // Of light that the base scatters back, without the perfectly specular lobes; `diffuse` is the diffuse lobe's.
-Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, vec3 diffuse, BaseWeights w) {
+Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, BASE_SHARE lost_i, vec3 diffuse, BaseWeights w) {
     float cos_d = dot(wo, wm);
     vec3 wo_t = wo, wi_t = wi, wm_t = wm;
 #if HAS_ANISOTROPIC
@@ -129,7 +132,7 @@ Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, vec3 diff
     vec3 f = LOBE(LOBE_DIFFUSE, diffuse);
     vec3 again = multiscatter_reflect(s, albedo_i, base_multiscatter(s));
 #if HAS_TRANSMISSION
-    again += multiscatter_beside(s, shares_lost(s), shares_lost(s, wi, albedo_i, s.inside));
+    again += multiscatter_beside(s, shares_lost(s), lost_i);
 #endif
     f += LOBE(LOBE_MULTISCATTER, again);
     float pdf = w.diffuse * INV_PI * wi.z;

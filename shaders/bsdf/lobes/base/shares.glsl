@@ -19,60 +19,102 @@ const float SHARES_MARGIN = 0.05;
 // What a film adds to the dielectric's reflectance at cosine c.
 vec3 shares_gain(Surface s, float c, float eta) { return base_dielectric(s, c, eta) - base_bare(s, c, eta); }
 
-// The mean of that by a rule for light of cosine c; `bare` is the mean of the bare boundary's reflectance.
-vec3 shares_mean(Surface s, float c, float eta, float rule, out float bare) {
-    float roughness = s.is_delta ? 0.0 : s.roughness;
-    vec4 cosines = energy_facets(c, roughness, rule), weights = energy_facets(c, roughness, rule + 1.0);
-    vec3 gain = vec3(0.0);
-    bare = 0.0;
-    for (int i = 0; i < 4; i++) {
-        gain += weights[i] * shares_gain(s, cosines[i], eta);
-        bare += weights[i] * base_bare(s, cosines[i], eta);
+// Means of what the film adds to the dielectric's reflectance, and of the bare boundary's reflectance.
+struct SharesMean {
+    vec3 gain;
+    float bare;
+};
+
+// Over four cosines of these weights; of none where it is not `needed`.
+SharesMean shares_mean(Surface s, vec4 cosines, vec4 weights, float eta, bool needed) {
+    SharesMean r = SharesMean(vec3(0.0), 0.0);
+    for (int i = 0; i < (needed ? 4 : 0); i++) {
+        r.gain += weights[i] * shares_gain(s, cosines[i], eta);
+        r.bare += weights[i] * base_bare(s, cosines[i], eta);
     }
-    return gain;
+    return r;
 }
 
-// The cosine-weighted mean over all directions of what a film adds. Thick films ripple with the angle more than four
-// cosines show, and rough facets less than smooth ones.
-vec3 shares_mean_gain(Surface s) {
-    float bare, rough = s.is_delta ? 0.0 : clamp((s.roughness - SHARES_SMOOTH) / SHARES_SMOOTH, 0.0, 1.0);
-    vec3 ripples = vec3(0.0), facets = vec3(0.0);
-    if (rough < 1.0) {
-        for (int i = 0; i < SHARES_RIPPLES; i++) {
-            ripples += shares_gain(s, sqrt((float(i) + 0.5) / float(SHARES_RIPPLES)), s.eta_outside);
-        }
-    }
-    if (rough > 0.0) facets = shares_mean(s, 0.0, s.eta_outside, FACETS_OF_ALL, bare);
-    return mix(ripples / float(SHARES_RIPPLES), facets, rough);
+// Over the facets that light of cosine c meets, by a rule.
+SharesMean shares_mean(Surface s, float c, float eta, float rule, bool needed) {
+    float roughness = s.is_delta ? 0.0 : s.roughness;
+    return shares_mean(s, energy_facets(c, roughness, rule), energy_facets(c, roughness, rule + 1.0), eta, needed);
 }
+
+float shares_eta(Surface s, bool inside) { return inside ? 1.0 / s.eta_outside : s.eta_outside; }
 
 // The loss between the facets of glass, of which `albedo` has that of bare ones: light that a facet reflects because of
-// the film is lost as reflected light is, and no more as what it passes.
-vec3 shares_lost(Surface s, float c, vec4 albedo, bool inside, float rule) {
-    float eta = inside ? 1.0 / s.eta_outside : s.eta_outside, lost = inside ? albedo.w : albedo.z, bare, met;
-    vec3 gain = shares_mean(s, c, eta, rule, bare), passed = gain;
+// the film is lost as reflected light is, and no more as what it passes. `some` is the mean over the facets that reflect
+// the light to its own side, `all` that over those that it meets; of light from inside, facets that reflect it to the outer
+// side of the horizon let hardly any pass, and `some` takes its place.
+vec3 shares_loss(Surface s, vec4 albedo, bool inside, SharesMean some, SharesMean all) {
+    float lost = inside ? albedo.w : albedo.z;
 #if HAS_THIN_WALLS
     // The loss of panes is a share of what goes through.
     if (s.is_thin) {
-        vec3 through = 1.0 - pane_reflected(albedo.x, clamp(albedo.y + albedo.x * gain, 0.0, albedo.x));
+        vec3 through = 1.0 - pane_reflected(albedo.x, clamp(albedo.y + albedo.x * some.gain, 0.0, albedo.x));
         return clamp(lost * through / max(1.0 - pane_reflected(albedo), 1e-3), 0.0, 1.0);
     }
 #endif
-    // Of light from inside, facets that reflect it to the outer side of the horizon let hardly any pass.
-    if (inside) met = bare;
-    else passed = shares_mean(s, c, eta, rule + FACETS_MET, met);
-    vec3 less = albedo.x * gain, more = (1.0 - lost - albedo.x * bare) / max(1.0 - met, 1e-3) * passed;
+    if (inside) all = some;
+    vec3 less = albedo.x * some.gain, more = (1.0 - lost - albedo.x * some.bare) / max(1.0 - all.bare, 1e-3) * all.gain;
     vec3 change = more - less - SHARES_MARGIN * (abs(less) + abs(more));
     return clamp(lost + change * clamp((s.roughness - SHARES_SMOOTH) / SHARES_SMOOTH, 0.0, 1.0), 0.0, 1.0);
+}
+
+// Sets what depends on wo, of a surface with a film. All means are taken in one loop: drivers inline each call, and the
+// film is most of such a kernel.
+void shares_face_film(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
+    float roughness = s.is_delta ? 0.0 : s.roughness;
+    SharesMean once, own, own_met, outside, outside_met, inside, fresnel;
+    vec3 ripples = vec3(0.0);
+    for (int k = 0; k < 7 + SHARES_RIPPLES / 4; k++) {
+        bool behind = k == 5 || (s.inside && (k == 1 || k == 2)), needed = HAS_TRANSMISSION != 0 || k == 0 || k == 3 || k > 5;
+        float rule = (k < 3 ? FACETS_OF_ONE : FACETS_OF_ALL) + (k == 2 || k == 4 ? FACETS_MET : 0.0);
+        vec4 cosines = energy_facets(k < 3 ? wo.z : 0.0, roughness, rule);
+        vec4 weights = energy_facets(k < 3 ? wo.z : 0.0, roughness, rule + 1.0);
+        if (k == 6) {
+            cosines = FRESNEL_COSINES;
+            weights = FRESNEL_WEIGHTS;
+        } else if (k > 6) {
+            cosines = sqrt((vec4(0.5, 1.5, 2.5, 3.5) + 4.0 * float(k - 7)) / float(SHARES_RIPPLES));
+            weights = vec4(1.0 / float(SHARES_RIPPLES));
+        }
+        SharesMean mean = shares_mean(s, cosines, weights, shares_eta(s, behind), needed);
+        if (k == 0) once = mean;
+        else if (k == 1) own = mean;
+        else if (k == 2) own_met = mean;
+        else if (k == 3) outside = mean;
+        else if (k == 4) outside_met = mean;
+        else if (k == 5) inside = mean;
+        else if (k == 6) fresnel = mean;
+        else ripples += mean.gain;
+    }
+    s.film_mean = vec3(mix(fresnel_mean(s.eta_outside), 1.0, s.excess)) + fresnel.gain;
+    s.film_metal_mean = vec3(0.0);
+    for (int i = 0; i < 4; i++) s.film_metal_mean += FRESNEL_WEIGHTS[i] * base_metal(s, FRESNEL_COSINES[i]);
+    s.film_once = clamp(albedo.y + albedo.x * once.gain, 0.0, albedo.x);
+    vec3 clear = shares_clear(s);
+    s.film_kept = clamp(multiscatter_albedo(albedo, clear) + (s.film_once - albedo.y), 0.0, 1.0);
+    // Thick films ripple with the angle more than four cosines show, and rough facets less than smooth ones.
+    float rough = s.is_delta ? 0.0 : clamp((s.roughness - SHARES_SMOOTH) / SHARES_SMOOTH, 0.0, 1.0);
+    vec3 gain = mix(ripples, outside.gain, rough);
+    s.film_kept_mean = clamp(multiscatter_albedo(albedo_mean, clear) + albedo_mean.x * gain, 0.0, 1.0);
+#if HAS_TRANSMISSION
+    s.film_lost = shares_loss(s, albedo, s.inside, own, own_met);
+    s.film_lost_outside = shares_loss(s, albedo_mean, false, outside, outside_met);
+    s.film_lost_inside = shares_loss(s, albedo_mean, true, inside, inside);
+#endif
 }
 #endif
 
 // The share of light from w that facets reflect once, and of that from wo.
 BASE_SHARE shares_once(Surface s, vec3 w, vec4 albedo) {
 #if HAS_FILM
-    float bare;
-    if (s.film > 0.0)
-        return clamp(albedo.y + albedo.x * shares_mean(s, w.z, s.eta_outside, FACETS_OF_ONE, bare), 0.0, albedo.x);
+    if (s.film > 0.0) {
+        vec3 gain = shares_mean(s, w.z, s.eta_outside, FACETS_OF_ONE, true).gain;
+        return clamp(albedo.y + albedo.x * gain, 0.0, albedo.x);
+    }
 #endif
     return BASE_SHARE(albedo.y);
 }
@@ -112,7 +154,16 @@ BASE_SHARE shares_kept_mean(Surface s) {
 // The loss between the facets of glass of light from w on the one side or the other, and that for wo.
 BASE_SHARE shares_lost(Surface s, vec3 w, vec4 albedo, bool inside) {
 #if HAS_FILM
-    if (s.film > 0.0) return shares_lost(s, abs(w.z), albedo, inside, FACETS_OF_ONE);
+    if (s.film > 0.0) {
+        SharesMean some, all;
+        for (int k = 0; k < 2; k++) {
+            float rule = k == 0 ? FACETS_OF_ONE : FACETS_OF_ONE + FACETS_MET;
+            SharesMean mean = shares_mean(s, w.z, shares_eta(s, inside), rule, k == 0 || !inside);
+            if (k == 0) some = mean;
+            else all = mean;
+        }
+        return shares_loss(s, albedo, inside, some, all);
+    }
 #endif
     return BASE_SHARE(inside ? albedo.w : albedo.z);
 }
@@ -131,23 +182,7 @@ void shares_face(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
     s.albedo_mean = albedo_mean;
 #if HAS_FILM
     s.film_cosine = wo.z;
-    if (s.film > 0.0) {
-        s.film_mean = vec3(mix(fresnel_mean(s.eta_outside), 1.0, s.excess));
-        s.film_metal_mean = vec3(0.0);
-        for (int i = 0; i < 4; i++) {
-            s.film_mean += FRESNEL_WEIGHTS[i] * shares_gain(s, FRESNEL_COSINES[i], s.eta_outside);
-            s.film_metal_mean += FRESNEL_WEIGHTS[i] * base_metal(s, FRESNEL_COSINES[i]);
-        }
-        s.film_once = shares_once(s, wo, albedo);
-        s.film_kept = shares_kept(s, wo, albedo);
-        vec3 kept = multiscatter_albedo(albedo_mean, shares_clear(s)) + albedo_mean.x * shares_mean_gain(s);
-        s.film_kept_mean = clamp(kept, 0.0, 1.0);
-#if HAS_TRANSMISSION
-        s.film_lost = shares_lost(s, wo.z, albedo, s.inside, FACETS_OF_ONE);
-        s.film_lost_outside = shares_lost(s, 0.0, albedo_mean, false, FACETS_OF_ALL);
-        s.film_lost_inside = shares_lost(s, 0.0, albedo_mean, true, FACETS_OF_ALL);
-#endif
-    }
+    if (s.film > 0.0) shares_face_film(wo, albedo, albedo_mean, s);
 #endif
 }
 #endif
