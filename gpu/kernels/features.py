@@ -166,8 +166,9 @@ def defines(
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
-    out["ANY_VEILS"] = int(not raised.isdisjoint(("HAS_OPACITY", "HAS_STRAIGHT")))
-    out["SHADOW_MEDIA"] = int(raised.issuperset(("HAS_STRAIGHT", "HAS_ATTENUATION")))
+    out["ANY_VEILS"] = int(not raised.isdisjoint(("HAS_OPACITY", "HAS_STRAIGHT", "HAS_PRIORITIES")))
+    ordered = raised.issuperset(("HAS_STRAIGHT", "HAS_ATTENUATION")) or "HAS_PRIORITIES" in raised
+    out["SHADOW_MEDIA"] = int(ordered)
     out |= {"QUAD_LAMP": -1} | textures_glsl.defines(None) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE

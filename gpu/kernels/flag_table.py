@@ -370,6 +370,7 @@ _ROWS = (
     Flag("HAS_SHARP_CAUSTICS", caustics.throws, previewed=_always, of_settings=True),
     Flag("HAS_ATTENUATION", media.attenuates, previewed=_any_of(TRANSMITTING)),
     Flag("HAS_MEDIA", media.fills, in_general=False),
+    Flag("HAS_PRIORITIES", media.ranks, in_general=False),
     Flag("HAS_SCATTERING", media.scatters, alone_with=("HAS_MEDIA",), in_general=False),
     Flag("HAS_GLOWING_MEDIA", media.glows, alone_with=("HAS_MEDIA",), in_general=False),
 )

@@ -7,7 +7,8 @@ from gpu.kernels.deltas import transmits
 
 
 def fills(scene: SceneArrays) -> bool:
-    """Whether something absorbs, scatters or shines along the way, besides what materials absorb."""
+    """Whether something absorbs, scatters or shines along the way, besides what materials absorb, or some body has a
+    priority."""
     return len(scene.bodies) > 0
 
 
@@ -17,6 +18,11 @@ def scatters(scene: SceneArrays) -> bool:
 
 def glows(scene: SceneArrays) -> bool:
     return bool((scene.bodies["emission"] > 0).any())
+
+
+def ranks(scene: SceneArrays) -> bool:
+    """Whether some bodies give way to others."""
+    return bool((scene.bodies["priority"] != 0).any())
 
 
 def attenuates(scene: SceneArrays) -> bool:

@@ -21,6 +21,7 @@ class MeshOddities:
     crowded: int = 0  # edges of more than two triangles
     turned: int = 0  # edges whose two triangles face opposite ways
     inwards: bool = False  # closed, and facing inwards
+    rim: int = 0  # edges of one triangle: with any the mesh is open
 
 
 @dataclass(frozen=True)

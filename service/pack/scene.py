@@ -14,7 +14,7 @@ from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets, ImageData, MeasuredData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import assemble
-from service.pack.geometry.bodies import bodies
+from service.pack.geometry.bodies import bodies, odd_media
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
@@ -113,7 +113,7 @@ def pack(
         bodies=bodies(scene),
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
-    odd = odd_meshes(built.meshes.odd, materials, emissive)
+    odd = (*odd_meshes(built.meshes.odd, materials, emissive), *odd_media(scene, materials, built.meshes.odd))
     return Packed(
         _with_geometry(arrays, built), [*odd, *built.warnings, *measured.warnings, *texture_warnings, *sky.warnings]
     )

@@ -9,6 +9,12 @@ bool material_is_thin(Material m) {
 #endif
 }
 
+// Its refractive index.
+float material_index(Material m) {
+    float f = sqrt(0.08 * m.specular);
+    return m.ior >= 1.0 ? m.ior : (1.0 + f) / (1.0 - f);
+}
+
 // Whether light passes through its surfaces.
 bool material_transmits(Material m) {
 #if HAS_THIN_WALLS

@@ -4,7 +4,7 @@
 #if HAS_MIRRORS
 // Scatters as bsdf_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
-    Surface s = surface_make(hues_leading(m, path.hues), here.tangent);
+    Surface s = surface_make(interaction_material(here, hues_leading(m, path.hues)), here.tangent);
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
     LobeSample lobe = dispersion_sample_delta(here, m, u, path.bounce == 0u ? uniforms.glint_chance : 0.0, s, path.hues);
     BsdfSample next;
@@ -21,7 +21,7 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
 
 // Takes a path on to the first surface that does more; false where the path ends on the way.
 bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Material m) {
-#if !(HAS_BVH || HAS_MIRRORS)
+#if !(HAS_BVH || HAS_MIRRORS || HAS_PRIORITIES)
     here = interaction_make(path, m);
     return true;
 #else
@@ -31,10 +31,15 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
         taken = false;
         if (path.alive) {
             here = interaction_make(path, m);
+#if HAS_PRIORITIES
+            if (path.passes) path_pass(here, path);
+#endif
 #if HAS_MIRRORS
             taken = material_is_delta(m) && !here.mapped && !scatter_was(path);
+            taken = taken && !path_passes(path);
             if (taken) delta_chain_step(here, m, rng, path);
 #endif
+            taken = taken || path_passes(path);
         }
     } while (taken && path.alive);
     return path.alive;

@@ -56,7 +56,7 @@ Scatter dispersion_eval(Surface s, Interaction here, Material m, Asked asked, in
 // Likewise for a surface that only mirrors or refracts; s becomes the leading channel's.
 LobeSample dispersion_sample_delta(Interaction here, Material m, float u, float least, inout Surface s,
                                    inout Hues hues) {
-    LobeSample lobe = models_sample_delta(here.wo, here.behind, u, least, s);
+    LobeSample lobe = models_sample_delta(here.wo, interaction_dense(here), u, least, s);
 #if HAS_DISPERSION
     if (hues_part(m)) {
         Scatter sum = Scatter(vec3(0.0), 0.0);
@@ -65,8 +65,9 @@ LobeSample dispersion_sample_delta(Interaction here, Material m, float u, float 
         uint j = 1u;
         if (lobe.wi.z > 0.0) do {
             uint channel = (hues.leads + j) % 3u;
-            Surface c = surface_make(hues_material(m, hues, channel), here.tangent);
-            dispersion_take(channel, models_sample_delta(here.wo, here.behind, 0.0, least, c).scatter, sum, pdfs);
+            Surface c = surface_make(interaction_material(here, hues_material(m, hues, channel)), here.tangent);
+            LobeSample other = models_sample_delta(here.wo, interaction_dense(here), 0.0, least, c);
+            dispersion_take(channel, other.scatter, sum, pdfs);
         } while (++j < 3u);
         sum.pdf = dot(pdfs, hues.shares) / 3.0;
         if (sum.pdf > 0.0) hues.shares *= pdfs / sum.pdf;

@@ -11,6 +11,10 @@ struct Interaction {
     vec3 coat;     // the coat's own normal, as the viewer sees it; only with HAS_COAT_NORMALS
     bool transmits;
     Medium beyond; // the medium on the other side
+#if HAS_PRIORITIES
+    float around;  // the index of what the body lies in
+    bool sparser;  // its own index is less than that
+#endif
 #if HAS_SCATTERING
     bool in_medium; // there is no surface: a particle of a medium scatters
     float g;
@@ -18,6 +22,34 @@ struct Interaction {
 };
 
 #include "path/scatter.glsl"
+
+#if HAS_PRIORITIES
+// Finds what the body lies in: it is around the outer side of the surface.
+void interaction_around(Material m, bool clear, Medium near, inout Interaction here) {
+    here.around = 1.0;
+    if (clear && here.behind) here.around = here.beyond.bodies.indices.x;
+    if (clear && !here.behind) here.around = near.bodies.indices.x;
+    here.sparser = material_index(m) < here.around;
+}
+#endif
+
+// The material with its index in what is around it. Where that is denser, the two change places.
+Material interaction_material(Interaction here, Material m) {
+#if HAS_PRIORITIES
+    float index = material_index(m);
+    if (here.around != 1.0) m.ior = max(here.sparser ? here.around / index : index / here.around, 1.0);
+#endif
+    return m;
+}
+
+// Whether the surface is seen from its denser side.
+bool interaction_dense(Interaction here) {
+#if HAS_PRIORITIES
+    return here.behind != here.sparser;
+#else
+    return here.behind;
+#endif
+}
 
 // Finds the bodies on both sides of the surface.
 void interaction_media(Material m, inout Interaction here, inout Path path) {
@@ -32,6 +64,9 @@ void interaction_media(Material m, inout Interaction here, inout Path path) {
     here.beyond = path.medium;
     if (clear && here.behind) here.beyond = medium_left(path.medium, body);
     if (clear && !here.behind) here.beyond = medium_entered(path.medium, body);
+#if HAS_PRIORITIES
+    interaction_around(m, clear, path.medium, here);
+#endif
 #else
     here.beyond = path.medium;
 #endif
@@ -86,7 +121,7 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
     here.transmits = material_transmits(m);
-    if (!scatter_was(path)) hues_meet(m, path.hues);
+    if (!scatter_was(path) && !path_passes(path)) hues_meet(m, path.hues);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     here.fold = here.front;
@@ -100,25 +135,30 @@ Interaction interaction_make(inout Path path, out Material m) {
 
 // The surface as seen from here.wo, ready for the lobes.
 Surface interaction_surface(Interaction here, Material m) {
-    Surface s = surface_make(m, here.tangent);
+    Surface s = surface_make(interaction_material(here, m), here.tangent);
 #if HAS_COAT_NORMALS
     s.coat = basis_make(basis_to_local(here.basis, here.coat));
 #endif
-    models_face(here.wo, here.behind, s);
+    models_face(here.wo, interaction_dense(here), s);
     scatter_surface(here, s);
     return s;
 }
 
 #if HAS_STRAIGHT || HAS_LAYERED_LIGHTS
 // The surface at a point that no path has come to, seen along w without normal maps. Of `here` it fills in what lobes ask
-// for: wo, behind, basis and tangent.
-Surface interaction_lone(SurfacePoint at, vec3 w, out Interaction here, out Material m) {
+// for: wo, behind, basis and tangent, and what decides on the index in `medium`.
+Surface interaction_lone(SurfacePoint at, vec3 w, Medium medium, out Interaction here, out Material m) {
     here.behind = dot(at.ng, w) < 0.0;
     here.basis = basis_make(sides_normal(at, w));
     here.wo = basis_to_local(here.basis, w);
     m = texture_material(at);
     interaction_tangent(at, m, here);
-    Surface s = surface_make(m, here.tangent);
+#if HAS_PRIORITIES
+    bool clear = material_transmits(m) && !material_is_thin(m);
+    here.beyond = medium_left(medium, medium_body(m, at.shape));
+    interaction_around(m, clear, medium, here);
+#endif
+    Surface s = surface_make(interaction_material(here, m), here.tangent);
 #if HAS_COAT_NORMALS
     s.coat = basis_make(vec3(0.0, 0.0, 1.0));
 #endif

@@ -4,7 +4,7 @@
 vec3 light_layers(SurfacePoint at, vec3 w) {
     Interaction here;
     Material m;
-    Surface s = interaction_lone(at, w, here, m);
+    Surface s = interaction_lone(at, w, medium_outside(), here, m);
     return models_emitted(s, here.wo);
 }
 #endif

@@ -1,5 +1,8 @@
+#include "path/bodies.glsl"
+
 // What is around a ray. The rates of bodies add up, so that nested or overlapping bodies may be entered and left in any
-// order; a ray that is in two bodies loses light to both. Outside of bodies is what fills all other space.
+// order; a ray that is in two bodies loses light to both, unless some have priorities. Outside of bodies is what fills all
+// other space.
 struct Medium {
 #if HAS_ATTENUATION
     vec3 rate;   // of extinction, 1/m: the sum over all bodies around the ray
@@ -8,6 +11,9 @@ struct Medium {
     vec3 scattering; // 1/m
     float forward;   // the mean cosine of scattering, times the mean of its rate
     vec3 emission;   // W / (m^3 sr)
+#endif
+#if HAS_PRIORITIES
+    Bodies bodies;   // of which all but the first are hidden
 #endif
 #else
     float unused; // a struct must have a member; every kernel passes media on
@@ -32,6 +38,22 @@ bool medium_around(Medium m) {
 #endif
 }
 
+#if HAS_MEDIA
+// The number of a shape's body.
+uint medium_id(uint shape) { return 1u + (shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN)); }
+#endif
+
+// Whether the ray passes the surface because it is inside a higher body.
+bool medium_hides(Medium m, SurfacePoint at, vec3 d) {
+#if HAS_PRIORITIES
+    Material material = material_pick(at.material);
+    bool body = material_transmits(material) && !material_is_thin(material);
+    return body && bodies_hide(m.bodies, medium_id(at.shape), dot(at.ng, d) > 0.0);
+#else
+    return false;
+#endif
+}
+
 #if HAS_ATTENUATION
 const float MEDIUM_WALL = 1e20; // 1/m; a rate above absorbs all light and would round away the others in a sum
 const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below passes at most
@@ -45,6 +67,9 @@ Medium medium_none() {
 #if HAS_MEDIA
     m.scattering = m.emission = vec3(0.0);
     m.forward = 0.0;
+#endif
+#if HAS_PRIORITIES
+    m.bodies = bodies_none();
 #endif
     return m;
 }
@@ -75,10 +100,25 @@ Medium medium_body(Material material, uint shape) {
     m.rate = surface_attenuation(material);
     m.depth = 1.0;
 #if HAS_MEDIA
-    medium_fill(1u + (shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN)), 1.0, m);
+    medium_fill(medium_id(shape), 1.0, m);
+#endif
+#if HAS_PRIORITIES
+    m.bodies = bodies_one(medium_id(shape), material_index(material), surface_attenuation(material));
 #endif
     return m;
 }
+
+#if HAS_PRIORITIES
+// That of the highest of these bodies.
+Medium medium_of(Bodies bodies) {
+    Medium m = medium_none();
+    m.bodies = bodies;
+    m.depth = bodies_count(bodies);
+    m.rate = bodies.rates[0];
+    medium_fill(bodies.ids.x, 1.0, m);
+    return m;
+}
+#endif
 
 Medium medium_sum(Medium a, Medium b, float times) {
     a.rate += times * b.rate;
@@ -102,7 +142,9 @@ Medium medium_real(Medium m) {
 }
 
 Medium medium_entered(Medium m, Medium body) {
-#if HAS_MEDIA
+#if HAS_PRIORITIES
+    return medium_of(bodies_with(m.bodies, body.bodies));
+#elif HAS_MEDIA
     if (m.depth < 0.5) return body;
 #endif
     return medium_sum(m, body, 1.0);
@@ -110,6 +152,9 @@ Medium medium_entered(Medium m, Medium body) {
 
 // Leaving the last body leaves nothing of it: a texture may have given the body another rate where it was entered.
 Medium medium_left(Medium m, Medium body) {
+#if HAS_PRIORITIES
+    return medium_of(bodies_without(m.bodies, body.bodies.ids.x));
+#endif
     if (m.depth > 1.5) return medium_real(medium_sum(m, body, -1.0));
     return medium_outside();
 }
@@ -131,6 +176,9 @@ Medium medium_at(vec3 from) {
     vec3 d = normalize(camera_to_world(MEDIUM_SEARCH));
     vec3 o = from;
     Medium sum = medium_none(), first = sum;
+#if HAS_PRIORITIES
+    Medium crossed = sum; // bodies that the line has entered and not left yet
+#endif
     vec3 walls = vec3(0.0);
     uint skip = NONE, layer = 0u, side = 0u;
     bool more;
@@ -146,17 +194,25 @@ Medium medium_at(vec3 from) {
         if (counts) {
             float crossing = dot(at.ng, d) > 0.0 ? 1.0 : -1.0;
             Medium body = medium_body(m, at.shape);
+#if HAS_PRIORITIES
+            if (crossing < 0.0) crossed = medium_entered(crossed, body);
+            else if (bodies_have(crossed.bodies, body.bodies.ids.x)) crossed = medium_left(crossed, body);
+            else sum = medium_entered(sum, body);
+#else
             vec3 wall = step(MEDIUM_WALL, body.rate);
             body.rate *= 1.0 - wall;
             sum = medium_sum(sum, body, crossing);
             walls += crossing * wall;
+#endif
         }
         if (more) {
             o = shapes_leave(at, d);
             skip = at.flat_id;
         } else {
+#if !HAS_PRIORITIES
             sum = medium_real(sum);
             sum.rate += MEDIUM_WALL * max(walls, vec3(0.0));
+#endif
             if (sum.depth < 0.5) sum = medium_outside();
             more = side == 0u && sum.depth > 0.5 && budget_lasts();
             if (side == 0u) first = sum;
@@ -167,6 +223,9 @@ Medium medium_at(vec3 from) {
             if (more) {
                 sum = medium_none();
                 walls = vec3(0.0);
+#if HAS_PRIORITIES
+                crossed = sum;
+#endif
             }
         }
         layer++;

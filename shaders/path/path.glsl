@@ -44,6 +44,9 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     path.passed = 0u;
     path.eta_scale = 1.0;
     path.medium = medium;
+#if HAS_PRIORITIES
+    path.passes = false;
+#endif
     path.cone = cone_begin(d);
     path.hues = hues_begin(rng, turn);
     caustics_begin(path);

@@ -26,7 +26,11 @@ struct Path {
     // unchanged; the factor is not part of the throughput, so that roulette does not see it.
     float eta_scale;
     Medium medium;
+#if HAS_PRIORITIES
+    bool passes;    // the ray ends at a boundary that is inside a higher body, and goes on there
+#endif
 #if HAS_SCATTERING
+    float distance_u; // what is left of the random number that decides on the next particle
     bool in_medium; // the ray ends at a particle (path/scatter.glsl)
 #endif
     Cone cone;

@@ -3,6 +3,15 @@
 // walk is short there is a second call, for the camera, and rays are traced ahead, at the end of a bounce: llvmpipe leaves
 // a loop only at its end, so tracing first would cost one fully masked shading pass, 3 to 9 % of a Cornell box's time.
 
+#if HAS_PRIORITIES
+// Takes the path past a boundary that is not there.
+void path_pass(Interaction here, inout Path path) {
+    path.medium = here.beyond;
+    path.o = shapes_leave(path.at, path.d);
+    path.travelled += path.hit.t;
+}
+#endif
+
 // Adds the emission and the ambient light of the surface that the path has reached.
 void path_add_emission(inout Path path) {
 #if HAS_EMISSION
@@ -10,11 +19,11 @@ void path_add_emission(inout Path path) {
     Cone cone = cone_none();
     if (path.found_pdf >= PDF_DELTA) cone = path.cone;
     vec3 arriving = found_light_emission(path.at, path.d, cone) * direct_found_weight(path) * path.eta_scale;
-    if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
+    if (path.hit.id != NONE && !path_passes(path)) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
 #endif
 #if HAS_AMBIENT
     vec3 ambient = found_light_ambient(path.at, path.d, path.cone) * path.eta_scale;
-    if (path.hit.id != NONE && !scatter_was(path)) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
+    if (path.hit.id != NONE && !scatter_was(path) && !path_passes(path)) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
 #endif
 }
 
@@ -28,6 +37,10 @@ void path_trace(Sampler rng, inout Path path) {
     path.cone = cone_after(path.cone, path.hit.t);
     path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
     path.alive = met && path.bounce < uniforms.max_bounces;
+#if HAS_PRIORITIES
+    path.passes = met && !scatter_was(path) && medium_hides(path.medium, path.at, path.d);
+    path.alive = path.alive || path.passes;
+#endif
     if (path.bounce == 0u) path.alpha = met || path.escaped ? 1.0 : 0.0;
     path_add_emission(path);
     path.radiance_before = path.radiance;
@@ -35,7 +48,7 @@ void path_trace(Sampler rng, inout Path path) {
 
 // Follows a ray at the end of the bounce where it begins, and that of the camera, in kernels that follow rays ahead.
 void path_trace_ahead(Sampler rng, inout Path path) {
-#if !(HAS_BVH || HAS_MIRRORS)
+#if !(HAS_BVH || HAS_MIRRORS || HAS_PRIORITIES)
     path_trace(rng, path);
 #endif
 }

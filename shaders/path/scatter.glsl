@@ -1,6 +1,15 @@
 // Scattering in media. A path that meets a particle before it comes to a surface turns there: `path.at` is that place, and
 // the phase function of Henyey and Greenstein [1941] takes the place of the BSDF, whose frame has wo as its z.
 
+// Whether the ray has come to a boundary that is not there.
+bool path_passes(Path path) {
+#if HAS_PRIORITIES
+    return path.passes;
+#else
+    return false;
+#endif
+}
+
 // Whether the path has met a particle at the end of its ray.
 bool scatter_was(Path path) {
 #if HAS_SCATTERING
@@ -14,7 +23,7 @@ bool scatter_was(Path path) {
 const uint SCATTER_ID = NONE - 1u; // in place of the id of a shape
 
 // Samples how far the ray goes before something scatters it: by the extinction of one channel, chosen as the throughput has
-// it, weighted by the balance heuristic over all three. `u` is used up, but for what `scatter_choose` leaves of it.
+// it, weighted by the balance heuristic over all three. Where it gets through, what is left of `u` decides on what follows.
 void scatter_distance(float u, inout Path path) {
     vec3 chance = path.throughput / (path.throughput.x + path.throughput.y + path.throughput.z);
     uint channel = u < chance.x ? 0u : u < chance.x + chance.y ? 1u : 2u;
@@ -32,6 +41,8 @@ void scatter_distance(float u, inout Path path) {
     float pdf = dot(chance, pdfs);
     path.throughput *= pdf > 0.0 ? weight / pdf : vec3(0.0);
     path.hit.t = t;
+    float chance_left = exp(-rate[channel] * t); // of coming so far
+    path.distance_u = clamp((u - (1.0 - chance_left)) / max(chance_left, 1e-30), 0.0, 1.0 - 1.0 / 16777216.0);
 }
 #endif
 
@@ -48,6 +59,9 @@ void scatter_travel(Sampler rng, inout Path path) {
 #if HAS_SCATTERING
     path.in_medium = false;
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_ROULETTE).y;
+#if HAS_PRIORITIES
+    if (path.passes) u = path.distance_u;
+#endif
     if (path.alive && max_component(path.medium.scattering) > 0.0) scatter_distance(u, path);
     else path.throughput *= medium_share(path.medium, path.hit.t);
     if (path.in_medium) {

@@ -22,6 +22,14 @@ bool shadow_lit(vec3 share) { return max_component(share) > 0.0; }
 void shadow_pass(SurfacePoint at, vec3 d, inout Shadow ray) {
     bool counts = transparency_counts(ray.layer);
     float opacity = 1.0;
+#if HAS_PRIORITIES
+    if (medium_hides(ray.medium, at, d)) {
+        Medium body = medium_body(texture_material(at), at.shape);
+        if (dot(at.ng, d) > 0.0) ray.medium = medium_left(ray.medium, body);
+        else ray.medium = medium_entered(ray.medium, body);
+        return;
+    }
+#endif
 #if HAS_OPACITY
     opacity = transparency_opacity(at, false);
 #endif
@@ -38,6 +46,8 @@ void shadow_pass(SurfacePoint at, vec3 d, inout Shadow ray) {
 // Whether the ray may pass a surface of that material.
 bool shadow_may_pass(uint material) {
 #if HAS_VERTEX_COLORS && HAS_OPACITY
+    return true;
+#elif HAS_PRIORITIES
     return true;
 #elif HAS_STRAIGHT
     Material m = material_pick(material);

@@ -49,8 +49,8 @@ bool straight_goes(Surface s, SurfacePoint at) {
 vec3 straight_share(SurfacePoint at, vec3 d, inout Medium medium) {
     Interaction here;
     Material m;
-    Surface s = interaction_lone(at, -d, here, m);
-    vec3 share = models_straight(here.wo, here.behind, s);
+    Surface s = interaction_lone(at, -d, medium, here, m);
+    vec3 share = models_straight(here.wo, interaction_dense(here), s);
 #if HAS_ATTENUATION
     if (!material_is_thin(m)) {
         Medium body = medium_body(m, at.shape);

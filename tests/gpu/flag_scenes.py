@@ -157,6 +157,7 @@ SCENES: dict[str, Doc] = {
     "STRAIGHT": made_of({**GLASS, "thin_walled": True, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
     "MEDIA": filled({"absorption": 1}),
+    "PRIORITIES": made_of(GLASS, {**ball("m"), "priority": 1}, FLOOR),
     "SCATTERING": filled({"scattering": 2}),
     "GLOWING_MEDIA": filled({"emission": 1}),
 }  # fmt: skip

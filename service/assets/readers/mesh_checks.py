@@ -29,7 +29,7 @@ def mesh_oddities(
         differing = coinciding - _repeated(_places(np.column_stack([vertices, *looks])).take(faces), count)
     boundary, crowded, turned = _edges(welded, count)
     inwards = not boundary and not crowded and not turned and _volume(vertices, faces) < 0
-    return MeshOddities(coinciding, differing, crowded, turned, inwards)
+    return MeshOddities(coinciding, differing, crowded, turned, inwards, boundary)
 
 
 def _flat(vertices: Doubles, faces: Indices) -> npt.NDArray[np.bool_]:

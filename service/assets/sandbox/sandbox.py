@@ -263,7 +263,7 @@ def _oddities(found: dict[str, Any]) -> MeshOddities:
     """The child is not trusted with types."""
     return MeshOddities(
         int(found["coinciding"]), int(found["differing"]), int(found["crowded"]), int(found["turned"]),
-        bool(found["inwards"]),
+        bool(found["inwards"]), int(found.get("rim", 0)),
     )  # fmt: skip
 
 

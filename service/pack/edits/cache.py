@@ -107,9 +107,10 @@ def _freeze(value: object) -> int:
 
 
 def content(shape: Shape) -> Hashable:
-    """A key that is equal for shapes that look the same, arrays by their bytes."""
+    """A key that is equal for shapes whose surfaces look the same, arrays by their bytes."""
     if not isinstance(shape, MeshShape):
-        return shape
+        filled = getattr(shape, "medium", None) is not None or getattr(shape, "priority", 0) != 0
+        return shape.model_copy(update={"medium": None, "priority": 0}) if filled else shape
     return tuple(digest(getattr(shape, name)) for name in MESH_FIELDS)
 
 

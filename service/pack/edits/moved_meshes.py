@@ -7,8 +7,8 @@ from collections.abc import Callable, Hashable, Sequence
 from gpu.arrays import HEAVY
 from service.scene.shape import MeshShape, Shape
 
-# The fields of a mesh that its looks depend on.
-MESH_FIELDS = tuple(name for name in MeshShape.model_fields if name != "name")
+# The fields of a mesh that its triangles depend on.
+MESH_FIELDS = tuple(name for name in MeshShape.model_fields if name not in ("name", "medium", "priority"))
 TRANSFORM = MESH_FIELDS.index("transform")
 STILL = [i for i, name in enumerate(MESH_FIELDS) if name not in ("transform", "material", "visible_to_camera")]
 

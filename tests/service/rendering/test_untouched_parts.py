@@ -72,7 +72,7 @@ VALUES = (
     np.diag([2.0, 1, 1, 1]).ravel().tolist(),
     {"texture": "image"}, {"texture": "image", "factor": 0}, {"texture": "checker", "factor": 0.5},
     [{"position": 0.5, "color": 0.3}, {"position": 1, "color": 0}],
-    {"texture": "other", "scale": 0.5}, {"texture": "other", "channel": "g"}, {"translate": [0, 1, 0]},
+    {"texture": "other", "scale": 0.5}, {"texture": "other", "channel": "g"}, {"translate": [0, 1, 0]}, {"scattering": 1},
 )  # fmt: skip
 
 
@@ -115,6 +115,12 @@ def bases() -> Iterator[tuple[Json, tuple[str | int, ...]]]:
         yield {**document(plain, ENVIRONMENTS[0]), "camera": camera}, ("camera",)
     for part in ("camera", "lights", "textures", "shapes"):
         yield document(textured("principled"), ENVIRONMENTS[0], lights=LIGHTS), (part,)
+    fog = {"absorption": 0.5, "scattering": 1, "g": 0.2, "emission": 0.1}
+    for medium in (fog, {"albedo": 0.5, "radius": 0.1}):
+        filled = document(material("principled", transmission=1), {**ENVIRONMENTS[0], "medium": medium})
+        filled["shapes"] = [{**each, "medium": medium} for each in SHAPES if each["type"] in ("sphere", "box")]
+        yield filled, ("environment", "medium")
+        yield filled, ("shapes",)
     for model in MODELS:
         for each in (material(model), textured(model)):
             yield document(each), ("materials", "m")
