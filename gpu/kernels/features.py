@@ -73,8 +73,9 @@ def _following(raised: frozenset[str], more: frozenset[str]) -> frozenset[str]:
 
 
 def evaluating(material: SceneArrays) -> frozenset[str]:
-    """The flags of kernels that evaluate the only material of a scene, while its sliders and menus are moved."""
-    raised = grown(frozenset(), material)
+    """The flags of kernels that evaluate the only material of a scene, while its sliders and menus are moved. What
+    lies under its surface has no part in that."""
+    raised = grown(frozenset(), material) - {"HAS_MEDIA", "HAS_SCATTERING", "HAS_WALKS"}
     return raised | {flag.name for flag in FLAGS.values() if beside(flag.evaluated_with, raised)}
 
 
@@ -164,6 +165,7 @@ def defines(
     settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name, flag in FLAGS.items() if not flag.of_settings}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
+    out["ANY_CHAINS"] = int(not raised.isdisjoint(("HAS_BVH", "HAS_MIRRORS", "HAS_PRIORITIES", "HAS_WALKS")))
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
     out["ANY_VEILS"] = int(not raised.isdisjoint(("HAS_OPACITY", "HAS_STRAIGHT", "HAS_PRIORITIES")))

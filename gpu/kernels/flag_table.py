@@ -372,6 +372,7 @@ _ROWS = (
     Flag("HAS_MEDIA", media.fills, in_general=False),
     Flag("HAS_PRIORITIES", media.ranks, in_general=False),
     Flag("HAS_SCATTERING", media.scatters, alone_with=("HAS_MEDIA",), in_general=False),
+    Flag("HAS_WALKS", media.walks, in_general=False),
     Flag("HAS_GLOWING_MEDIA", media.glows, alone_with=("HAS_MEDIA",), in_general=False),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

@@ -18,6 +18,8 @@ and where the row in `gpu/layout/models.py` says so:
     NAME_straight(wo, behind, s)               `may_be_delta`: the share of light from wo that goes straight through a
                                                surface that bends nothing
     NAME_emitted(s, wo)                        `covers_emission`: what its layers leave of its own light
+    NAME_left(s, wi)                           `walks`: what the surface leaves of light that comes out from under it;
+                                               NAME_sample has a lobe that enters
     NAME_terms(s, wo, wi, wm)                  `has_terms`: the Terms for a facet's normal wm
     NAME_metal(s, c), NAME_metal_mean(s)       `needs_tables`: the metal's reflectance at cosine c, and its mean
     NAME_tinted(s, f)                          `needs_tables`: the dielectric's reflectance f with the model's colour
@@ -41,7 +43,7 @@ def members() -> str:
 
 def predicates() -> str:
     """Functions that say what the model of a number can do."""
-    return "\n".join(_predicate(trait) for trait in ("transmits", "may_be_delta"))
+    return "\n".join(_predicate(trait) for trait in ("transmits", "may_be_delta", "walks"))
 
 
 def text() -> str:
@@ -80,6 +82,10 @@ def text() -> str:
                     "vec3 r = vec3(0.0);", _only(deltas, "r = {}_straight(wo, behind, s);")),
         _dispatcher("vec3 models_emitted(Surface s, vec3 wo)",
                     "vec3 r = vec3(1.0);", _ladder(_with("covers_emission"), "r = {}_emitted(s, wo);")),
+        "#if HAS_WALKS",
+        _dispatcher("vec3 models_left(Surface s, vec3 wi)",
+                    "vec3 r = vec3(1.0);", _lobes(_with("walks"), "r = {}_left(s, wi);")),
+        "#endif",
         _dispatcher("Terms models_terms(Surface s, vec3 wo, vec3 wi, vec3 wm)",
                     "Terms r = Terms(vec3(0.0), 0.0, 0.0, true);",
                     _ladder(_with("has_terms"), "r = {}_terms(s, wo, wi, wm);")),

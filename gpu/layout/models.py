@@ -47,6 +47,7 @@ class Model:
     has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
     has_coat_normals: bool = False  # its coat may have a normal of its own
     covers_emission: bool = False  # its emission lies under its coat and its fuzz
+    walks: bool = False  # light walks under its surface where `subsurface` and `subsurface_radius` are above 0
     has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
     optional: tuple[str, ...] = ()  # members of `layout.Material` that raise a flag where they are above 0
     # What it has besides `layout.Material`, and the member of `SceneArrays` that begins with one for each material.
@@ -120,6 +121,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
+        walks=True,
         optional=(*_LAYERS, "conductor_eta", "film_thickness"),
     ),
     Model(
@@ -134,7 +136,16 @@ MODELS = (
         has_coat_normals=True,
         covers_emission=True,
         has_members=True,
-        optional=("sheen", "anisotropic", "coat_anisotropy", "clearcoat", "diffuse_roughness", "film_thickness"),
+        walks=True,
+        optional=(
+            "subsurface",
+            "sheen",
+            "anisotropic",
+            "coat_anisotropy",
+            "clearcoat",
+            "diffuse_roughness",
+            "film_thickness",
+        ),
         words=((Lobe.SHEEN, "fuzz"), (Lobe.CLEARCOAT, "coat")),
         in_general=False,
     ),
@@ -151,6 +162,7 @@ def of(materials: np.ndarray, models: Iterable[Model]) -> np.ndarray:
 
 
 TRANSMITTING = tuple(model for model in MODELS if model.transmits)
+WALKING = tuple(model for model in MODELS if model.walks)
 DELTA = tuple(model for model in MODELS if model.may_be_delta)
 COVERING = tuple(model for model in MODELS if model.covers_emission)
 COATED = tuple(model for model in MODELS if model.has_coat_normals)

@@ -30,7 +30,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
         "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
         "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color", "coat_color", "base_weight",
         "diffuse_roughness", "coat_darkening", "coat_anisotropy",
-        "diffuse_transmission", "diffuse_transmission_color", "film_weight",
+        "diffuse_transmission", "diffuse_transmission_color", "film_weight", "subsurface_color",
     )
 } | {
     "shininess": LARGE,

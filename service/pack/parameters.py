@@ -33,6 +33,13 @@ RENAMED_IN = {
         "specular_ior": "ior",
         "transmission_weight": "transmission",
         "transmission_color": "attenuation_color",
+        "transmission_depth": "attenuation_distance",
+        "transmission_scatter": "scatter_color",
+        "transmission_scatter_anisotropy": "scatter_g",
+        "subsurface_weight": "subsurface",
+        "subsurface_radius": "",  # in its scale
+        "subsurface_radius_scale": "subsurface_radius",
+        "subsurface_scatter_anisotropy": "subsurface_g",
         "transmission_dispersion_abbe_number": "dispersion",
         "coat_weight": "clearcoat",
         "coat_roughness": "clearcoat_roughness",
@@ -90,6 +97,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     records["number"] = np.arange(len(records))
     records["film_weight"] = 1.0  # of models that have no weight
+    records["subsurface_radius"] = layout.ABSENT
     for record, material in zip(records, scene.materials.values(), strict=True):
         record["model"] = models.NUMBERS[material.type]
         for name in type(material).model_fields:
@@ -102,6 +110,8 @@ def pack_materials(scene: Scene) -> np.ndarray:
                 if isinstance(value, ScalarTexture | ColorTexture):
                     value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
+        for member, value in material.derived().items():
+            record[member] = value
         record["opacity"] = opacity(material)
         if isinstance(material, SolidSurface) or material.alpha_cutoff is None:
             record["cutoff"] = layout.ABSENT

@@ -102,7 +102,11 @@ def parse_scene(
     errors += islice(_dangling(document), MOST_MISTAKES)
     if errors:
         raise InvalidDocument(errors[:MOST_MISTAKES]).under(pointer)
-    return scene.model_copy(update=parts)
+    scene = scene.model_copy(update=parts)
+    errors = list(islice(_filled_twice(scene), MOST_MISTAKES))
+    if errors:
+        raise InvalidDocument(errors).under(pointer)
+    return scene
 
 
 def too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
@@ -129,6 +133,15 @@ def _part(name: str, entries: Any, before: Parsed | None, errors: list[FieldErro
     fresh, found = validated_entries(_ENTRIES[name], pairs, known)
     errors += (FieldError(f"/{name}{error.pointer}", error.detail) for error in found)
     return fresh if isinstance(entries, dict) else list(fresh.values())
+
+
+def _filled_twice(scene: Scene) -> Iterator[FieldError]:
+    """Errors for media of shapes whose material says by itself what is under its surface."""
+    filled = {name for name, material in scene.materials.items() if material.is_filled()}
+    for i, shape in enumerate(scene.shapes if filled else ()):
+        if shape.material in filled and getattr(shape, "medium", None) is not None:
+            detail = f"the material {shape.material!r} has a medium of its own: a body has one of the two"
+            yield FieldError(f"/shapes/{i}/medium", detail)
 
 
 def _place(error: FieldError) -> int:

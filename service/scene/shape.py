@@ -36,7 +36,13 @@ class _Body(_Placed):
     priority: Annotated[
         int,
         Field(ge=-100, le=100),
-        hint("Priority", "Where bodies that light passes through overlap, the highest one is there.", unit=""),
+        hint(
+            "Priority",
+            "Where bodies that light passes through overlap, the highest one is there.",
+            unit="",
+            widget="number",
+            soft=(-10, 10),
+        ),
     ] = 0
     medium: Annotated[Medium | None, OMITTABLE, hint("Medium", "What fills it, behind a surface that transmits.")] = (
         None

@@ -24,6 +24,7 @@ struct BsdfSample {
     Scatter scatter;
     float side;    // its sign says on which side of the surface d is
     bool is_delta; // a perfectly specular lobe gave it
+    bool enters;   // it goes on to walk under the surface
     bool straight; // that of a surface that light goes straight through
     bool valid;    // false: the path ends
 };
@@ -51,6 +52,20 @@ const int BSDF_DELTAS = 3; // perfectly specular lobes that a surface has at mos
 // A sample of lobes that are not perfectly specular.
 LobeSample bsdf_rough_sample(vec3 wi) { return LobeSample(wi, false, Scatter(vec3(0.0), 0.0), false); }
 
+#if HAS_WALKS
+// The sample of light that enters straight, to walk under the surface: f is the share that does, of the chance `pdf`. It
+// is told from others by having no lobe of its own.
+LobeSample bsdf_entering(vec3 wo, vec3 f, float pdf) { return LobeSample(-wo, false, Scatter(f, pdf), true); }
+#endif
+
+bool bsdf_enters(LobeSample r) {
+#if HAS_WALKS
+    return !r.is_delta && r.coated && r.scatter.pdf > 0.0;
+#else
+    return false;
+#endif
+}
+
 // Into the specular lobe's own frame, whose x is the tangent, and back.
 vec3 bsdf_turn(Surface s, vec3 w) {
     return vec3(dot(s.tangent, w.xy), s.tangent.x * w.y - s.tangent.y * w.x, w.z);
@@ -76,6 +91,9 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_SCATTERING
     if (s.in_medium) return phase_eval(s.g, wo, wi);
 #endif
+#if HAS_WALKS
+    if (s.exits) return wi.z > 0.0 ? Scatter(models_left(s, wi) * (INV_PI * wi.z), INV_PI * wi.z) : Scatter(vec3(0.0), 0.0);
+#endif
 #if HAS_TRANSMISSION
     bool below = model_transmits(s.model) && wi.z < 0.0;
     if (wo.z <= 0.0 || (wi.z <= 0.0 && !below)) return Scatter(vec3(0.0), 0.0);
@@ -96,6 +114,9 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_SCATTERING
     if (s.in_medium) r = bsdf_rough_sample(phase_sample(s.g, u));
 #endif
+#if HAS_WALKS
+    if (s.exits) r = bsdf_rough_sample(sampling_cosine(u));
+#endif
     return r;
 }
 
@@ -103,7 +124,7 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 // sampled as always. Of a uniform direction `scatter` has only the density.
 LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
     LobeSample r = bsdf_sample(s, wo, u_lobe, u);
-    if (!r.is_delta) {
+    if (!r.is_delta && !bsdf_enters(r)) {
         r.coated = false;
         r.wi = sampling_hemisphere(u);
         r.scatter.pdf = 0.5 * INV_PI;
@@ -112,12 +133,18 @@ LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_THIN_WALLS
         through = through || s.diffuse_transmission > 0.0;
 #endif
+#if HAS_WALKS
+        through = through && !s.exits;
+#endif
         if (model_transmits(s.model) && through) {
             r.wi = sampling_sphere(u);
             r.scatter.pdf *= 0.5;
         }
 #endif
         r.scatter.pdf *= 1.0 - models_delta_chance(s, wo);
+#if HAS_WALKS
+        if (s.exits) r.scatter.pdf = 0.5 * INV_PI;
+#endif
 #if HAS_SCATTERING
         if (s.in_medium) {
             r.wi = sampling_sphere(u);

@@ -27,6 +27,16 @@ bool material_transmits(Material m) {
 #endif
 }
 
+// Whether light walks under its surfaces.
+bool material_walks(Material m) {
+#if HAS_WALKS
+    bool deep = max_component(m.subsurface_radius) > 0.0 && !material_is_thin(m);
+    return model_walks(m.model) && m.subsurface > 0.0 && deep && m.metallic < 1.0;
+#else
+    return false;
+#endif
+}
+
 // Whether light may go straight through its surfaces (path/straight.glsl decides at each point): they are walls or have
 // the index 1. Not where a texture gives what decides on that, as a path reads it over its footprint and a ray to a light
 // at a point, nor where the surface shines, as a light's sample is the nearest place of a lamp.

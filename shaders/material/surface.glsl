@@ -65,6 +65,10 @@ struct Surface {
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame
 #endif
+#if HAS_WALKS
+    float walks;    // the share of the diffuse light that walks under the surface
+    bool exits;     // light comes out that has walked there
+#endif
 #if HAS_SCATTERING
     bool in_medium; // a particle scatters: by its phase function
     float g;        // mean cosine
@@ -115,6 +119,14 @@ Surface surface_plain(Material m) {
     s.clearcoat = 0.0;
     s.alpha_coat = 1.0;
     s.tangent = vec2(1.0, 0.0);
+#if HAS_WALKS
+    s.walks = 0.0;
+    s.exits = false;
+    if (material_walks(m)) {
+        s.walks = m.subsurface;
+        s.subsurface = 0.0;
+    }
+#endif
 #if HAS_SCATTERING
     s.in_medium = false;
     s.g = 0.0;

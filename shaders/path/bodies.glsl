@@ -8,16 +8,20 @@ const int BODIES_MOST = 4; // around a ray; beyond, the lowest ones are forgotte
 struct Bodies {
     uvec4 ids;     // the highest first: 1 + the shape, 0: none
     vec4 indices;  // of refraction
-    mat4x3 rates;  // at which their materials absorb, 1/m
+    mat4x3 rates;  // of their materials' extinction, 1/m
+    mat4x3 scattering;
+    vec4 forward;  // mean cosine times the mean of scattering
 };
 
-Bodies bodies_none() { return Bodies(uvec4(0u), vec4(1.0), mat4x3(0.0)); }
+Bodies bodies_none() { return Bodies(uvec4(0u), vec4(1.0), mat4x3(0.0), mat4x3(0.0), vec4(0.0)); }
 
-Bodies bodies_one(uint id, float index, vec3 rate) {
+Bodies bodies_one(uint id, float index, vec3 rate, vec3 scattering, float forward) {
     Bodies b = bodies_none();
     b.ids.x = id;
     b.indices.x = index;
     b.rates[0] = rate;
+    b.scattering[0] = scattering;
+    b.forward.x = forward;
     return b;
 }
 
@@ -37,11 +41,15 @@ Bodies bodies_with(Bodies b, Bodies one) {
             b.ids[i] = b.ids[max(i - 1, 0)];
             b.indices[i] = b.indices[max(i - 1, 0)];
             b.rates[i] = b.rates[max(i - 1, 0)];
+            b.scattering[i] = b.scattering[max(i - 1, 0)];
+            b.forward[i] = b.forward[max(i - 1, 0)];
         }
         if (i == at) {
             b.ids[i] = one.ids.x;
             b.indices[i] = one.indices.x;
             b.rates[i] = one.rates[0];
+            b.scattering[i] = one.scattering[0];
+            b.forward[i] = one.forward.x;
         }
     }
     return b;
@@ -58,6 +66,8 @@ Bodies bodies_without(Bodies b, uint id) {
             b.ids[i] = last ? 0u : b.ids[next];
             b.indices[i] = last ? 1.0 : b.indices[next];
             b.rates[i] = last ? vec3(0.0) : b.rates[next];
+            b.scattering[i] = last ? vec3(0.0) : b.scattering[next];
+            b.forward[i] = last ? 0.0 : b.forward[next];
         }
     }
     return b;

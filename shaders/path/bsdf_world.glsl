@@ -31,6 +31,6 @@ Scatter bsdf_eval_world(Surface s, Interaction here, Asked asked) {
 #if ESTIMATOR == ESTIMATOR_UNIFORM
     if (asked.goes_on) scatter.pdf = asked.lobe.scatter.pdf;
 #endif
-    if (asked.goes_on && asked.lobe.is_delta) scatter = asked.lobe.scatter;
+    if (asked.goes_on && (asked.lobe.is_delta || bsdf_enters(asked.lobe))) scatter = asked.lobe.scatter;
     return scatter;
 }

@@ -12,6 +12,7 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
     next.scatter = lobe.scatter;
     next.side = lobe.wi.z;
     next.is_delta = true;
+    next.enters = false;
     next.straight = lobe.wi.z < 0.0 && straight_goes(s, path.at);
     next.valid = next.scatter.pdf > 0.0 && terminator_agrees(path.at, next.d, lobe.wi.z, dot(next.d, here.front));
     path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
@@ -21,7 +22,7 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
 
 // Takes a path on to the first surface that does more; false where the path ends on the way.
 bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Material m) {
-#if !(HAS_BVH || HAS_MIRRORS || HAS_PRIORITIES)
+#if !ANY_CHAINS
     here = interaction_make(path, m);
     return true;
 #else
@@ -34,12 +35,15 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
 #if HAS_PRIORITIES
             if (path.passes) path_pass(here, path);
 #endif
+#if HAS_WALKS
+            if (path.walks) walk_step(rng, path);
+#endif
+            bool passed = path_passes(path) || walk_goes_on(path);
 #if HAS_MIRRORS
-            taken = material_is_delta(m) && !here.mapped && !scatter_was(path);
-            taken = taken && !path_passes(path);
+            taken = material_is_delta(m) && !here.mapped && !scatter_was(path) && !passed && !walk_ends(path);
             if (taken) delta_chain_step(here, m, rng, path);
 #endif
-            taken = taken || path_passes(path);
+            taken = taken || passed;
         }
     } while (taken && path.alive);
     return path.alive;

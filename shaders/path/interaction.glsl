@@ -16,6 +16,9 @@ struct Interaction {
     bool sparser;  // its own index is less than that
 #endif
 #if HAS_SCATTERING
+#if HAS_WALKS
+    bool exits;     // light comes out that has walked under the surface
+#endif
     bool in_medium; // there is no surface: a particle of a medium scatters
     float g;
 #endif
@@ -55,7 +58,7 @@ bool interaction_dense(Interaction here) {
 void interaction_media(Material m, inout Interaction here, inout Path path) {
 #if HAS_ATTENUATION
     Medium body = medium_body(m, path.at.shape);
-    bool clear = here.transmits && !material_is_thin(m) && !scatter_was(path);
+    bool clear = here.transmits && !material_is_thin(m) && !scatter_was(path) && !walk_under(path);
     if (clear && here.behind && path.medium.depth < 0.5) {
         // This is the back of an open sheet: the path counts as inside a body since it began.
         path.medium = medium_entered(path.medium, body);
@@ -121,7 +124,7 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
     here.transmits = material_transmits(m);
-    if (!scatter_was(path) && !path_passes(path)) hues_meet(m, path.hues);
+    if (!scatter_was(path) && !path_passes(path) && !walk_under(path)) hues_meet(m, path.hues);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     here.fold = here.front;

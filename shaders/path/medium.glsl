@@ -99,11 +99,20 @@ Medium medium_body(Material material, uint shape) {
     Medium m = medium_none();
     m.rate = surface_attenuation(material);
     m.depth = 1.0;
-#if HAS_MEDIA
-    medium_fill(medium_id(shape), 1.0, m);
+#if HAS_SCATTERING
+    // Where it scatters more than it takes away, what it absorbs is raised by a grey until nothing is negative.
+    vec3 scattering = vec3(0.0);
+    if (material.attenuation_distance > 0.0) scattering = material.scatter_color / material.attenuation_distance;
+    vec3 absorbed = m.rate - scattering;
+    m.rate -= min(min(min(absorbed.x, absorbed.y), absorbed.z), 0.0);
+    m.scattering = scattering;
+    m.forward = material.scatter_g * dot(scattering, vec3(1.0 / 3.0));
 #endif
 #if HAS_PRIORITIES
-    m.bodies = bodies_one(medium_id(shape), material_index(material), surface_attenuation(material));
+    m.bodies = bodies_one(medium_id(shape), material_index(material), m.rate, m.scattering, m.forward);
+#endif
+#if HAS_MEDIA
+    medium_fill(medium_id(shape), 1.0, m);
 #endif
     return m;
 }
@@ -115,6 +124,8 @@ Medium medium_of(Bodies bodies) {
     m.bodies = bodies;
     m.depth = bodies_count(bodies);
     m.rate = bodies.rates[0];
+    m.scattering = bodies.scattering[0];
+    m.forward = bodies.forward.x;
     medium_fill(bodies.ids.x, 1.0, m);
     return m;
 }

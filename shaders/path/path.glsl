@@ -47,6 +47,11 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
 #if HAS_PRIORITIES
     path.passes = false;
 #endif
+#if HAS_WALKS
+    path.walks = path.exits = false;
+    path.walked = path.steps = 0u;
+    path.outside = medium;
+#endif
     path.cone = cone_begin(d);
     path.hues = hues_begin(rng, turn);
     caustics_begin(path);
@@ -78,6 +83,9 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
             BsdfSample next = path_shade(s, here, m, lit, share, rng, path);
             if (!next.straight) path.lit = lit;
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
+#if HAS_WALKS
+            if (next.enters) walk_begin(m, path);
+#endif
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);
         }

@@ -29,6 +29,14 @@ struct Path {
 #if HAS_PRIORITIES
     bool passes;    // the ray ends at a boundary that is inside a higher body, and goes on there
 #endif
+#if HAS_WALKS
+    bool walks;     // under a surface: path/walk.glsl
+    bool exits;     // the ray ends where it comes out again
+    uint walked;    // how often it did so
+    uint steps;     // of this walk
+    uint walk_shape; // whose surface it is
+    Medium outside; // of that surface
+#endif
 #if HAS_SCATTERING
     float distance_u; // what is left of the random number that decides on the next particle
     bool in_medium; // the ray ends at a particle (path/scatter.glsl)

@@ -8,9 +8,15 @@ BsdfSample path_sample(Surface s, Interaction here, Sampler rng, Path path, out 
     r.scatter = lobe.scatter;
     r.side = here.mapped ? dot(r.d, here.fold) : lobe.wi.z;
     r.is_delta = lobe.is_delta;
+    r.enters = bsdf_enters(lobe);
     r.straight = lobe.is_delta && lobe.wi.z < 0.0 && !lobe.coated && straight_goes(s, path.at);
     float across = dot(r.d, here.front);
     r.valid = here.mapped ? normal_map_keeps(s, lobe) : terminator_agrees(path.at, r.d, lobe.wi.z, across);
+    if (r.enters) {
+        r.d = path.d;
+        r.side = 1.0; // radiance is as it is outside
+        r.valid = true;
+    }
     asked = Asked(r.d, lobe.wi, true, lobe);
     return r;
 }

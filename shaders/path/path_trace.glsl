@@ -19,11 +19,13 @@ void path_add_emission(inout Path path) {
     Cone cone = cone_none();
     if (path.found_pdf >= PDF_DELTA) cone = path.cone;
     vec3 arriving = found_light_emission(path.at, path.d, cone) * direct_found_weight(path) * path.eta_scale;
-    if (path.hit.id != NONE && !path_passes(path)) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
+    bool shows = path.hit.id != NONE && !path_passes(path) && !walk_under(path);
+    if (shows) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
 #endif
 #if HAS_AMBIENT
     vec3 ambient = found_light_ambient(path.at, path.d, path.cone) * path.eta_scale;
-    if (path.hit.id != NONE && !scatter_was(path) && !path_passes(path)) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
+    bool ambient_shows = path.hit.id != NONE && !scatter_was(path) && !path_passes(path) && !walk_under(path);
+    if (ambient_shows) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u + path.passed);
 #endif
 }
 
@@ -35,8 +37,14 @@ void path_trace(Sampler rng, inout Path path) {
     scatter_travel(rng, path);
     bool met = path.hit.id != NONE;
     path.cone = cone_after(path.cone, path.hit.t);
-    path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
+#if HAS_WALKS
+    walk_arrive(path);
+#endif
+    path.escaped = path.alive && !met && !walk_goes_on(path) && path.counts && (path.bounce > 0u || found_light_background());
     path.alive = met && path.bounce < uniforms.max_bounces;
+#if HAS_WALKS
+    path.alive = met && (path.walks || path.bounce < uniforms.max_bounces + path.walked) && path.steps < WALK_STEPS;
+#endif
 #if HAS_PRIORITIES
     path.passes = met && !scatter_was(path) && medium_hides(path.medium, path.at, path.d);
     path.alive = path.alive || path.passes;
@@ -48,7 +56,7 @@ void path_trace(Sampler rng, inout Path path) {
 
 // Follows a ray at the end of the bounce where it begins, and that of the camera, in kernels that follow rays ahead.
 void path_trace_ahead(Sampler rng, inout Path path) {
-#if !(HAS_BVH || HAS_MIRRORS || HAS_PRIORITIES)
+#if !ANY_CHAINS
     path_trace(rng, path);
 #endif
 }

@@ -1,6 +1,8 @@
 // Scattering in media. A path that meets a particle before it comes to a surface turns there: `path.at` is that place, and
 // the phase function of Henyey and Greenstein [1941] takes the place of the BSDF, whose frame has wo as its z.
 
+#include "path/walk.glsl"
+
 // Whether the ray has come to a boundary that is not there.
 bool path_passes(Path path) {
 #if HAS_PRIORITIES
@@ -62,6 +64,9 @@ void scatter_travel(Sampler rng, inout Path path) {
 #if HAS_PRIORITIES
     if (path.passes) u = path.distance_u;
 #endif
+#if HAS_WALKS
+    if (path.walks) u = walk_random(rng, path, 0u);
+#endif
     if (path.alive && max_component(path.medium.scattering) > 0.0) scatter_distance(u, path);
     else path.throughput *= medium_share(path.medium, path.hit.t);
     if (path.in_medium) {
@@ -86,6 +91,9 @@ void scatter_interaction(Path path, inout Interaction here) {
         here.transmits = true;
     }
 #endif
+#if HAS_WALKS
+    walk_interaction(path, here);
+#endif
 }
 
 // Gives the surface the phase function, if there is none.
@@ -93,6 +101,10 @@ void scatter_surface(Interaction here, inout Surface s) {
 #if HAS_SCATTERING
     s.in_medium = here.in_medium;
     s.g = here.g;
+#if HAS_WALKS
+    s.exits = here.exits;
+    if (here.behind) s.walks = 0.0; // it is entered from outside
+#endif
 #if ANY_TRANSMITS
     if (here.in_medium) s.eta = 1.0;
 #endif

@@ -24,7 +24,7 @@ float sides_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
 
 // Whether a direction is on the same side of the shading normal and of the surface itself.
 bool sides_agrees(float shading, float geometric) {
-#if HAS_TRANSMISSION || HAS_SCATTERING
+#if HAS_TRANSMISSION || HAS_SCATTERING || HAS_WALKS
     return shading * geometric > 0.0;
 #else
     return geometric > 0.0;

@@ -159,5 +159,6 @@ SCENES: dict[str, Doc] = {
     "MEDIA": filled({"absorption": 1}),
     "PRIORITIES": made_of(GLASS, {**ball("m"), "priority": 1}, FLOOR),
     "SCATTERING": filled({"scattering": 2}),
+    "WALKS": made_of({"type": "principled", "subsurface": 1, "subsurface_radius": 0.2}),
     "GLOWING_MEDIA": filled({"emission": 1}),
 }  # fmt: skip

@@ -177,8 +177,10 @@ def test_a_plain_one_is_the_plain_principled(prober: Prober) -> None:
     np.testing.assert_allclose(found, told[0][:, 0], rtol=1e-5)
 
 
-def test_what_needs_light_inside_bodies_is_refused_by_name() -> None:
-    scene = document([], {"m": {"type": "openpbr", "subsurface_weight": 0.5}})
-    with pytest.raises(InvalidDocument) as refused:
-        parse_scene(scene, "", Config())
-    assert refused.value.errors[0].pointer == "/materials/m/subsurface_weight"
+def test_a_shape_has_one_medium() -> None:
+    for more in ({"subsurface_weight": 0.5}, {"transmission_weight": 1, "transmission_depth": 1}):
+        filled = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m", "medium": {"absorption": 1}}
+        scene = document([filled], {"m": {"type": "openpbr", **more}})
+        with pytest.raises(InvalidDocument) as refused:
+            parse_scene(scene, "", Config())
+        assert refused.value.errors[0].pointer == "/shapes/0/medium"

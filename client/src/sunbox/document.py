@@ -555,11 +555,30 @@ class OpenpbrMaterial(TypedDict, total=False):
     """Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default
     0.0)"""
     transmission_color: list[float] | float | str | ColorTexture
-    """Tints light each time that it passes the surface. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """Tints light that passes the surface, or by the transmission depth the inside. (0 to 1, default [1.0, 1.0,
+    1.0])"""
+    transmission_depth: float
+    """How far inside light takes the transmission colour; 0: it is tinted where it passes the surface. (m, 0 to
+    1e+09, default 0.0)"""
+    transmission_scatter: list[float] | float | str
+    """How much of the light turns inside, over the transmission depth. (0 to 1, default [0.0, 0.0, 0.0])"""
+    transmission_scatter_anisotropy: float
+    """The mean cosine of a turn inside: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
     transmission_dispersion_scale: float
     """How much of the dispersion that the Abbe number stands for; 0 is none. (0 to 1, default 0.0)"""
     transmission_dispersion_abbe_number: float
     """How little refracted light spreads into colours: flint 30, diamond 55, crown 60. (0 to 1e+09, default 20.0)"""
+    subsurface_weight: float | ScalarTexture
+    """Share of the diffuse light that walks below the surface, as in skin, wax or milk. (0 to 1, default 0.0)"""
+    subsurface_color: list[float] | float | str | ColorTexture
+    """What much of it shows head-on. (0 to 1, default [0.8, 0.8, 0.8])"""
+    subsurface_radius: float
+    """How far light goes below the surface between turns; 0: it comes back where it enters. (m, 0 to 1e+09, default
+    1.0)"""
+    subsurface_radius_scale: list[float] | float | str
+    """A factor on the radius, per channel. (0 to 1, default [1.0, 0.5, 0.25])"""
+    subsurface_scatter_anisotropy: float
+    """The mean cosine of a turn: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
     coat_weight: float | ScalarTexture
     """How much of the surface a clear coat covers. (0 to 1, default 0.0)"""
     coat_color: list[float] | float | str | ColorTexture
@@ -571,7 +590,7 @@ class OpenpbrMaterial(TypedDict, total=False):
     coat_ior: float | ScalarTexture
     """Of the coat's refraction; lacquer is 1.5 to 1.6. (0.001 to 1000, default 1.6)"""
     coat_darkening: float | ScalarTexture
-    """How much the reflections inside the coat darken what lies under it; 1 is what they do. (0 to 1, default 1.0)"""
+    """How much reflections inside the coat darken what lies under it; 1 is what they do. (0 to 1, default 1.0)"""
     fuzz_weight: float | ScalarTexture
     """How much of the surface fibres or dust cover. (0 to 1, default 0.0)"""
     fuzz_color: list[float] | float | str | ColorTexture
@@ -721,6 +740,9 @@ class PrincipledMaterial(TypedDict, total=False):
     """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
     clearcoat_gloss: float | ScalarTexture
     """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
+    subsurface_radius: list[float] | float | str | dict[str, Any]
+    """How far light goes below the surface between turns, per channel; without it, subsurface is a flatter shade. (m,
+    0 to 1e+09)"""
     transmission: float | ScalarTexture
     """Share of the base that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default 0.0)"""
     ior: float | ScalarTexture

@@ -12,6 +12,7 @@ disney          the "principled" BRDF of 2012
 principled      the production model, with glass, coat and sheen: `disney` and more
 openpbr         OpenPBR Surface
 openpbr_film    the thin film of `openpbr`, and its indices
+subsurface      media under the surface of `principled` and `openpbr`
 openpbr_words   what it and other models say in other words
 metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
-from service.scene.base import OMITTABLE, hint, refusal
-from service.scene.material import openpbr_words
+from service.scene.base import OMITTABLE, hint
+from service.scene.material import openpbr_words, subsurface
 from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.openpbr_film import AnyPositiveIndex, FilmIndex, FilmThickness, FilmWeight, in_nanometres
 from service.scene.material.surface import AnySurface, EmissionSides, Height
@@ -26,12 +26,6 @@ from service.scene.texture import (
     NormalTexture,
     ScalarTexture,
 )
-
-# Parameters of OpenPBR that the renderer has nothing for yet.
-UNSUPPORTED = (
-    "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy", "subsurface_weight",
-    "subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy",
-)  # fmt: skip
 
 Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
 
@@ -148,12 +142,15 @@ class OpenpbrMaterial(AnySurface):
         AnyReflectance,
         hint(
             "Transmission colour",
-            "Tints light each time that it passes the surface.",
+            "Tints light that passes the surface, or by the transmission depth the inside.",
             group="Transmission",
             unit="",
             widget="color",
         ),
     ] = (1.0, 1.0, 1.0)
+    transmission_depth: subsurface.Depth = 0.0
+    transmission_scatter: subsurface.Scatter = (0.0, 0.0, 0.0)
+    transmission_scatter_anisotropy: subsurface.ScatterAnisotropy = 0.0
     transmission_dispersion_scale: Annotated[
         Fraction,
         hint(
@@ -168,6 +165,11 @@ class OpenpbrMaterial(AnySurface):
             group="Transmission", unit="", widget="slider", soft=(9, 91),
         ),
     ] = 20.0  # fmt: skip
+    subsurface_weight: subsurface.Weight = 0.0
+    subsurface_color: subsurface.Color = (0.8, 0.8, 0.8)
+    subsurface_radius: subsurface.Radius = 1.0
+    subsurface_radius_scale: subsurface.RadiusScale = (1.0, 0.5, 0.25)
+    subsurface_scatter_anisotropy: subsurface.Anisotropy = 0.0
     coat_weight: Annotated[
         AnyFraction,
         hint(
@@ -220,13 +222,10 @@ class OpenpbrMaterial(AnySurface):
     coat_darkening: Annotated[
         AnyFraction,
         hint(
-            "Coat darkening",
-            "How much the reflections inside the coat darken what lies under it; 1 is what they do.",
-            group="Coat",
-            unit="",
-            widget="slider",
+            "Coat darkening", "How much reflections inside the coat darken what lies under it; 1 is what they do.",
+            group="Coat", unit="", widget="slider",
         ),
-    ] = 1.0
+    ] = 1.0  # fmt: skip
     fuzz_weight: Annotated[
         AnyFraction,
         hint(
@@ -333,24 +332,11 @@ class OpenpbrMaterial(AnySurface):
         Tangent | None,
         OMITTABLE,
         hint(
-            "Coat tangent",
-            "Where the coat's anisotropy stretches its highlights.",
-            group="Coat",
-            unit="",
-            widget="number",
-            absent="along u",
+            "Coat tangent", "Where the coat's anisotropy stretches its highlights.",
+            group="Coat", unit="", widget="number", absent="along u",
         ),
-    ] = None
+    ] = None  # fmt: skip
     height: Height = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_bodies(cls, value: Any) -> Any:
-        if isinstance(value, dict):
-            for name in UNSUPPORTED:
-                if name in value:
-                    raise refusal(f"{name} of OpenPBR is not supported yet; leave it out", f"/{name}")
-        return value
 
     def value(self, name: str) -> Any:
         found = super().value(name)
@@ -363,9 +349,27 @@ class OpenpbrMaterial(AnySurface):
             return dispersion(found, self.transmission_dispersion_scale)
         if name == "thin_film_thickness":
             return in_nanometres(found)
+        if name == "transmission_depth":
+            return found or None
+        if name == "subsurface_radius_scale":
+            return subsurface.radii(self.subsurface_radius, found)
+        if name in ("transmission_scatter_anisotropy", "subsurface_scatter_anisotropy"):
+            return subsurface.open_interval(found)
         if name in ("geometry_tangent", "geometry_coat_tangent"):
             return 0.0 if found is None else turn_of(found)
         return found
+
+    def derived(self) -> dict[str, float]:
+        """A thin wall is as thick as a leaf: what walks in it comes out on either side."""
+        if not self.geometry_thin_walled:
+            return {}
+        through = subsurface.factor_of(self.subsurface_weight) * (1 + self.subsurface_scatter_anisotropy) / 2
+        return {"diffuse_transmission": through}
+
+    def is_filled(self) -> bool:
+        """Whether it says by itself what is under its surface."""
+        walks = subsurface.factor_of(self.subsurface_weight) > 0 and self.subsurface_radius > 0
+        return (walks or self.transmission_depth > 0) and not self.geometry_thin_walled
 
     @classmethod
     def left(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:

@@ -37,6 +37,8 @@ def take(old: Document, made: Document) -> set[str]:
     if "abbe" in old:
         made |= {"transmission_dispersion_scale": 1, "transmission_dispersion_abbe_number": old["abbe"]}
         used.add("abbe")
+    if old.get("subsurface", 0) != 0:
+        used |= _walk(old, made)
     film = old.get("film_thickness", 0)
     if isinstance(film, dict) or film > 0:
         made |= {"thin_film_weight": 1, "thin_film_thickness": _scaled(film, 1e-3)}
@@ -65,6 +67,39 @@ def _scaled(value: Any, factor: float) -> Any:
     if isinstance(value, dict):
         return value | {"factor": rounded(factor * value.get("factor", 1.0), 6)}
     return rounded(factor * value, 6)
+
+
+def _walk(old: Document, made: Document) -> set[str]:
+    """What is under the surface of an `openpbr`; flat where it has no radius."""
+    if "base_color" in old:
+        made["subsurface_color"] = old["base_color"]
+    radius = _linear(old["subsurface_radius"]) if old.get("subsurface_radius") is not None else (0.0, 0.0, 0.0)
+    longest = max(radius)
+    made["subsurface_radius"] = rounded(longest, 6)
+    if longest > 0:
+        made["subsurface_radius_scale"] = [rounded(x / longest, 6) for x in radius]
+    return {"subsurface_radius"}
+
+
+def _walked(old: Document, made: Document) -> set[str]:
+    """What is under the surface, of an `openpbr`, in other words."""
+    names = {name for name in old if name.startswith("subsurface_")}
+    if old.get("subsurface_weight", 0) == 0:
+        return names
+    used = (
+        names & {"subsurface_weight", "subsurface_radius", "subsurface_radius_scale"}
+        if "subsurface" in made
+        else set()
+    )
+    radius, scale = old.get("subsurface_radius", 1.0), _linear(old.get("subsurface_radius_scale", [1.0, 0.5, 0.25]))
+    if "subsurface" in made and radius > 0:
+        made["subsurface_radius"] = [rounded(radius * x, 6) for x in scale]
+    if old["subsurface_weight"] == 1 and "base_color" in made:
+        made["base_color"] = old.get("subsurface_color", 0.8)
+        used |= {"subsurface_color"}
+    return used | (
+        names & {"subsurface_scatter_anisotropy"} if old.get("subsurface_scatter_anisotropy") == 0 else set()
+    )
 
 
 def _shine(emission: Any, made: Document) -> set[str]:
@@ -99,6 +134,7 @@ def leave(old: Document, made: Document) -> set[str]:
     if (share := old.get("transmission_dispersion_scale", 0)) > 0:
         made["abbe"] = min(old.get("transmission_dispersion_abbe_number", ABBE) / share, LARGEST)
     used |= {"transmission_dispersion_scale", "transmission_dispersion_abbe_number"}
+    used |= _walked(old, made)
     if old.get("specular_weight", 1) == 1 or old.get("base_metalness") == 1:
         used.add("specular_weight")
     if old.get("coat_ior") == COAT_IOR:

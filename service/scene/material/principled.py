@@ -12,6 +12,7 @@ from service.scene.material import openpbr_words
 from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.disney import DisneyMaterial
+from service.scene.material.subsurface import WalkRadius
 from service.scene.texture import (
     AnyDegrees,
     AnyFraction,
@@ -39,6 +40,7 @@ class PrincipledMaterial(DisneyMaterial):
     """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
 
     type: Literal["principled"]  # type: ignore[assignment]
+    subsurface_radius: WalkRadius = None
     transmission: Annotated[
         AnyFraction,
         hint(
@@ -267,6 +269,10 @@ class PrincipledMaterial(DisneyMaterial):
         through = self.diffuse_transmission
         passes = through.factor > 0 if isinstance(through, ScalarTexture) else through > 0
         return self.thin_walled or passes
+
+    def is_filled(self) -> bool:
+        """Whether it says by itself what is under its surface."""
+        return self.subsurface_radius is not None and max(self.subsurface_radius) > 0 and not self.is_thin
 
     def value(self, name: str) -> Any:
         if name == "abbe":

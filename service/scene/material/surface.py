@@ -56,6 +56,14 @@ class AnySurface(Model):
         """A document of the model with another value of a menu, and what follows from that."""
         return document | {name: value}
 
+    def derived(self) -> dict[str, float]:
+        """Members of the renderer's record that follow from several parameters."""
+        return {}
+
+    def is_filled(self) -> bool:
+        """Whether it says by itself what is under its surface."""
+        return False
+
     @classmethod
     def left(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
         """Bring to `made`, a document of another model with what both know by one name, what else there is of `old`,

@@ -50,6 +50,13 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
     s.specular_color = m.specular_color;
     s.specular_weight = m.specular;
     s.clear_color = m.attenuation_color;
+#if HAS_ATTENUATION
+    if (m.attenuation_distance > 0.0) s.clear_color = vec3(1.0); // the inside has that colour
+#endif
+    s.matte_color = s.base_color;
+#if HAS_SUBSURFACE
+    s.matte_color = mix(s.base_color, m.subsurface_color, s.subsurface);
+#endif
     s.transmission = 0.0;
     s.inside = s.bare = false;
 #if HAS_TRANSMISSION
@@ -89,7 +96,9 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
 #if HAS_THIN_WALLS
     s.is_thin = m.thin_walled > 0.0;
     s.pane_narrowing = pane_narrowing(s.eta_outside);
-    s.diffuse_transmission = 0.0;
+    s.diffuse_transmission = s.is_thin ? m.diffuse_transmission : 0.0;
+    s.diffuse_through = m.subsurface_color;
+    s.matte_color -= s.diffuse_transmission * s.diffuse_through;
 #endif
     s.alpha = openpbr_alpha(roughness, m.anisotropic, s.aspect);
     s.roughness = sqrt(sqrt(s.alpha.x * s.alpha.y)); // of the round lobe that the tables stretch
@@ -125,7 +134,7 @@ vec3 openpbr_tinted(Surface s, BASE_SHARE f) { return s.bare ? vec3(f) : f * s.s
 // The albedo of the base head-on and its roughness, as the coat's darkening wants them.
 vec3 openpbr_base_albedo(Surface s, out float roughness) {
     BASE_SHARE f = base_dielectric(s, 1.0, s.eta_outside);
-    vec3 dielectric = f * s.specular_color + (1.0 - f) * mix(s.base_color, s.clear_color, s.transmission);
+    vec3 dielectric = f * s.specular_color + (1.0 - f) * mix(s.matte_color, s.clear_color, s.transmission);
     roughness = mix(mix(1.0, s.roughness, base_grey(f)), s.roughness, s.metallic);
     return mix(dielectric, base_metal(s, 1.0), s.metallic);
 }
@@ -195,11 +204,37 @@ struct OpenpbrWeights {
     BaseWeights base;
     float fuzz;
     float coat;
+    float walk;
 };
+
+#if HAS_WALKS
+// What enters to walk under the surface, and the share of it that the layers leave on its way out.
+vec3 openpbr_entering(Surface s, vec3 wo) {
+    vec3 left = vec3((1.0 - s.sheen_albedo) * (1.0 - s.coat_albedo));
+#if HAS_CLEARCOAT
+    left *= mix(vec3(1.0), coat_crossed(s, abs(coat_to_local(s, wo).z)), s.clearcoat) * s.coat_darkening;
+#endif
+    return openpbr_diffuse_share(s) * s.walks * (1.0 - shares_kept(s)) * left;
+}
+
+vec3 openpbr_left(Surface s, vec3 wi) {
+    vec3 left = vec3((1.0 - shares_kept(s, wi, base_albedo(s, wi))) / max(1.0 - shares_kept_mean(s), 1e-6));
+#if HAS_CLEARCOAT
+    left *= mix(vec3(1.0), coat_crossed(s, abs(coat_to_local(s, wi).z)), s.clearcoat);
+#endif
+    return left;
+}
+#endif
 
 OpenpbrWeights openpbr_weights(Surface s, vec3 wo) {
     BaseWeights base = base_weights(s, wo, openpbr_diffuse_weight(s, shares_kept(s)));
-    OpenpbrWeights w = OpenpbrWeights(base, 0.0, 0.0);
+#if HAS_THIN_WALLS
+    base.diffuse_below += openpbr_through_weight(s, shares_kept(s));
+#endif
+    OpenpbrWeights w = OpenpbrWeights(base, 0.0, 0.0, 0.0);
+#if HAS_WALKS
+    w.walk = luminance(openpbr_entering(s, wo));
+#endif
 #if HAS_SHEEN
     w.fuzz = s.bare ? 0.0 : s.fuzz.z * luminance(s.sheen);
 #endif
@@ -207,9 +242,9 @@ OpenpbrWeights openpbr_weights(Surface s, vec3 wo) {
     w.coat = s.coat_albedo * (1.0 - s.sheen_albedo);
 #endif
     float under = (1.0 - s.coat_albedo) * (1.0 - s.sheen_albedo);
-    float inv = 1.0 / ((base.diffuse + base.diffuse_below + base.specular) * under + w.coat + w.fuzz);
+    float inv = 1.0 / ((base.diffuse + base.diffuse_below + base.specular) * under + w.coat + w.fuzz + w.walk);
     w.base = BaseWeights(base.diffuse * under * inv, base.diffuse_below * under * inv, base.specular * under * inv);
-    return OpenpbrWeights(w.base, w.fuzz * inv, w.coat * inv);
+    return OpenpbrWeights(w.base, w.fuzz * inv, w.coat * inv, w.walk * inv);
 }
 
 // Without the perfectly specular lobes.
@@ -221,6 +256,10 @@ Scatter openpbr_eval(Surface s, vec3 wo, vec3 wi) {
     lost_i = base_lost(s, wi, albedo_i);
     if (wi.z < 0.0) {
         Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, w.base);
+#if HAS_THIN_WALLS
+        vec3 through = openpbr_through_eval(s, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
+        below.f += LOBE(LOBE_DIFFUSE, through);
+#endif
         below.f *= openpbr_layers(s, wo, wi);
         return below;
     }
@@ -293,6 +332,10 @@ LobeSample openpbr_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 #if HAS_CLEARCOAT
     if (v >= 0.0 && w.coat > 0.0) r = openpbr_sample_coat(s, wo, u, w.coat);
+    v -= w.coat;
+#endif
+#if HAS_WALKS
+    if (v >= 0.0 && w.walk > 0.0) r = bsdf_entering(wo, openpbr_entering(s, wo), w.walk);
 #endif
     return r;
 }
@@ -308,7 +351,7 @@ float openpbr_delta_chance(Surface s, vec3 wo) {
 #if HAS_CLEARCOAT
     if (s.coat_is_delta) p += w.coat;
 #endif
-    return p;
+    return p + w.walk;
 }
 
 // What openpbr_sample gives for a surface that only mirrors or refracts, without the work for other lobes.

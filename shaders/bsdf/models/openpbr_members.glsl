@@ -1,6 +1,7 @@
 // What only `openpbr` needs of a Surface; `surface.glsl` puts it there.
 #if HAS_OPENPBR
     float specular_weight;
+    vec3 matte_color;      // of the diffuse base
     bool bare;             // wo is inside a body that transmits, where no layer is seen
     bool turned_out;       // the index is below 1: the denser side is the outer one
     float diffuse_roughness;

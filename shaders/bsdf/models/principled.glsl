@@ -114,6 +114,7 @@ struct PrincipledWeights {
     BaseWeights base;
     float sheen;
     float coat;
+    float walk;
 };
 
 // The share of light that the layers leave to the base: between wo and wi, or by wo alone where only one is outside.
@@ -176,6 +177,19 @@ void principled_face(vec3 wo, bool behind, inout Surface s) {
     principled_face_layers(wo, s);
 }
 
+#if HAS_WALKS
+// What enters to walk under the surface, and the share of it that the base leaves on its way out. The layers, which
+// reflect the same from both sides, take theirs once.
+vec3 principled_entering(Surface s) {
+    float share = (1.0 - s.metallic) * (1.0 - s.transmission) * s.walks * principled_layers(s, 0.0, 0.0);
+    return share * vec3(1.0 - shares_kept(s));
+}
+
+vec3 principled_left(Surface s, vec3 wi) {
+    return vec3((1.0 - shares_kept(s, wi, base_albedo(s, wi))) / max(1.0 - shares_kept_mean(s), 1e-6));
+}
+#endif
+
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
     float diffuse = principled_diffuse_weight(s, shares_kept(s));
 #if HAS_THIN_WALLS
@@ -186,7 +200,10 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
     BaseWeights base = base_weights(s, wo, diffuse);
 #endif
     float under = principled_layers(s, 0.0, 0.0);
-    PrincipledWeights w = PrincipledWeights(base, 0.0, 0.0);
+    PrincipledWeights w = PrincipledWeights(base, 0.0, 0.0, 0.0);
+#if HAS_WALKS
+    w.walk = luminance(principled_entering(s));
+#endif
     w.base.diffuse *= under;
     w.base.diffuse_below *= under;
     w.base.specular *= under;
@@ -196,9 +213,9 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
 #if HAS_CLEARCOAT
     w.coat = s.coat_albedo;
 #endif
-    float inv = 1.0 / (w.base.diffuse + w.base.diffuse_below + w.base.specular + w.sheen + w.coat);
+    float inv = 1.0 / (w.base.diffuse + w.base.diffuse_below + w.base.specular + w.sheen + w.coat + w.walk);
     w.base = BaseWeights(w.base.diffuse * inv, w.base.diffuse_below * inv, w.base.specular * inv);
-    return PrincipledWeights(w.base, w.sheen * inv, w.coat * inv);
+    return PrincipledWeights(w.base, w.sheen * inv, w.coat * inv, w.walk * inv);
 }
 
 // Without the perfectly specular lobes.
@@ -294,6 +311,10 @@ LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 #if HAS_CLEARCOAT
     if (v >= 0.0 && w.coat > 0.0) r = principled_sample_coat(s, wo, u, w.coat);
+    v -= w.coat;
+#endif
+#if HAS_WALKS
+    if (v >= 0.0 && w.walk > 0.0) r = bsdf_entering(wo, principled_entering(s), w.walk);
 #endif
     return r;
 }
@@ -310,7 +331,7 @@ float principled_delta_chance(Surface s, vec3 wo) {
 #if HAS_CLEARCOAT
     if (s.coat_is_delta) p += w.coat;
 #endif
-    return p;
+    return p + w.walk;
 }
 
 // What principled_sample gives for a surface that only mirrors or refracts, without the work for other lobes.

@@ -67,6 +67,12 @@ MEMBERS = {
     ("microfacet", "f0"): "specular_color",
     ("openpbr", "base_diffuse_roughness"): "diffuse_roughness",
     ("openpbr", "base_metalness"): "metallic",
+    ("openpbr", "transmission_depth"): "attenuation_distance",
+    ("openpbr", "transmission_scatter"): "scatter_color",
+    ("openpbr", "transmission_scatter_anisotropy"): "scatter_g",
+    ("openpbr", "subsurface_weight"): "subsurface",
+    ("openpbr", "subsurface_radius_scale"): "subsurface_radius",
+    ("openpbr", "subsurface_scatter_anisotropy"): "subsurface_g",
     ("openpbr", "specular_weight"): "specular",
     ("openpbr", "specular_roughness"): "roughness",
     ("openpbr", "specular_roughness_anisotropy"): "anisotropic",
@@ -107,10 +113,11 @@ def test_every_number_of_a_material_has_its_place(model):
         own = {"emission", "diffuse", "f0", "ior"}
     if model == "openpbr":  # its emission is a product, its tangents become angles, its films are in micrometres
         own = {name for name in own if not name.startswith(("emission", "geometry", "transmission_disp"))}
-        own = own - {"thin_film_thickness"} | {"geometry_opacity"}
+        own = own - {"thin_film_thickness", "subsurface_radius"} | {"geometry_opacity"}
     for i, name in enumerate(sorted(own)):
         coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name in (
             "sheen_color",
+            "subsurface_radius",
             "conductor_eta",
             "conductor_k",
             "diffuse_transmission_color",

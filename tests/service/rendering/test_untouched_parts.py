@@ -72,7 +72,8 @@ VALUES = (
     np.diag([2.0, 1, 1, 1]).ravel().tolist(),
     {"texture": "image"}, {"texture": "image", "factor": 0}, {"texture": "checker", "factor": 0.5},
     [{"position": 0.5, "color": 0.3}, {"position": 1, "color": 0}],
-    {"texture": "other", "scale": 0.5}, {"texture": "other", "channel": "g"}, {"translate": [0, 1, 0]}, {"scattering": 1},
+    {"texture": "other", "scale": 0.5}, {"texture": "other", "channel": "g"}, {"translate": [0, 1, 0]},
+    {"scattering": 1},
 )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from service.scene import parse_scene, parse_settings, schema
 from service.scene.base import Group
 
 WHOLE = schema()
-UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "cd/m^2", "s", "pixels", "nm", "um"}
+UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "cd/m^2", "s", "pixels", "nm", "um", "1/m", "W/(m^3 sr)"}
 WIDGETS = {"slider", "color", "number", "angle"}
 
 
@@ -104,8 +104,14 @@ UNTEXTURED = {
         "geometry_coat_tangent",
         "transmission_dispersion_scale",
         "transmission_dispersion_abbe_number",
+        "transmission_depth",
+        "transmission_scatter",
+        "transmission_scatter_anisotropy",
+        "subsurface_radius",
+        "subsurface_radius_scale",
+        "subsurface_scatter_anisotropy",
     },
-    "PrincipledMaterial": {"abbe", "conductor_eta", "conductor_k"},
+    "PrincipledMaterial": {"abbe", "subsurface_radius", "conductor_eta", "conductor_k"},
 }
 
 

@@ -4,6 +4,15 @@
 #if HAS_OPENPBR
 float openpbr_diffuse_share(Surface s) { return (1.0 - s.metallic) * (1.0 - s.transmission); }
 
+// What of that does not walk under the surface.
+float openpbr_matte_share(Surface s) {
+#if HAS_WALKS
+    return openpbr_diffuse_share(s) * (1.0 - s.walks);
+#else
+    return openpbr_diffuse_share(s);
+#endif
+}
+
 #if HAS_DIFFUSE_ROUGHNESS
 const float EON_SLOPE = 0.5 - 2.0 / 3.0 * INV_PI;
 const float EON_MEAN = 2.0 / 3.0 - 28.0 / 15.0 * INV_PI;
@@ -33,7 +42,7 @@ vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, BASE_SHARE albedo_o, BASE
                           BASE_SHARE albedo_mean) {
     BASE_SHARE passed_o = 1.0 - albedo_o, passed_i = 1.0 - albedo_i;
     BASE_SHARE even = passed_o * passed_i / max(1.0 - albedo_mean, 1e-6);
-    vec3 f = even * s.base_color;
+    vec3 f = even * s.matte_color;
 #if HAS_DIFFUSE_ROUGHNESS
     float r = s.diffuse_roughness;
     if (r > 0.0) {
@@ -43,14 +52,26 @@ vec3 openpbr_diffuse_eval(Surface s, vec3 wo, vec3 wi, BASE_SHARE albedo_o, BASE
         BASE_SHARE apart = side * (side > 0.0 ? 1.0 / max(wo.z, wi.z) : 1.0) * min(min(passed_o, passed_i), even);
         BASE_SHARE lost_o = openpbr_diffuse_lost(wo.z, r) * passed_o, lost_i = openpbr_diffuse_lost(wi.z, r) * passed_i;
         BASE_SHARE lost = lost_o * lost_i / max(openpbr_diffuse_lost_mean(s), 1e-6);
-        vec3 more = s.base_color * s.base_color * mean / (1.0 - s.base_color * (1.0 - mean)); // colour of several scatterings
-        f = s.base_color * (a * (even + r * apart)) + more * lost;
+        vec3 more = s.matte_color * s.matte_color * mean / (1.0 - s.matte_color * (1.0 - mean)); // colour of several scatterings
+        f = s.matte_color * (a * (even + r * apart)) + more * lost;
     }
 #endif
-    return openpbr_diffuse_share(s) * INV_PI * f;
+    return openpbr_matte_share(s) * INV_PI * f;
 }
 
 float openpbr_diffuse_weight(Surface s, BASE_SHARE albedo_o) {
-    return openpbr_diffuse_share(s) * luminance(s.base_color) * (1.0 - base_grey(albedo_o));
+    return openpbr_matte_share(s) * luminance(s.matte_color) * (1.0 - base_grey(albedo_o));
 }
+
+#if HAS_THIN_WALLS
+// Of light that walks in a thin wall and comes out on its other side, whose boundary it passes, too.
+vec3 openpbr_through_eval(Surface s, BASE_SHARE albedo_o, BASE_SHARE albedo_i, BASE_SHARE albedo_mean) {
+    BASE_SHARE f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
+    return openpbr_diffuse_share(s) * s.diffuse_transmission * INV_PI * f * s.diffuse_through;
+}
+
+float openpbr_through_weight(Surface s, BASE_SHARE albedo_o) {
+    return openpbr_diffuse_share(s) * s.diffuse_transmission * luminance(s.diffuse_through) * (1.0 - base_grey(albedo_o));
+}
+#endif
 #endif

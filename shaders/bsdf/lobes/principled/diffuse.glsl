@@ -6,6 +6,15 @@
 // The albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).
 float principled_diffuse_seeliger(float c) { return c > 0.0 ? 1.0 - c * log(1.0 + 1.0 / c) : 1.0; }
 
+// The share of the base that is diffuse and sends light back where it comes in.
+float principled_matte_share(Surface s) {
+    float share = (1.0 - s.metallic) * (1.0 - s.transmission);
+#if HAS_WALKS
+    share *= 1.0 - s.walks;
+#endif
+    return share;
+}
+
 vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, BASE_SHARE albedo_o, BASE_SHARE albedo_i,
                              BASE_SHARE albedo_mean) {
     BASE_SHARE f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
@@ -16,7 +25,7 @@ vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, BASE_SHARE alb
     float even = 0.5 / (cos_o + cos_i) + lost_o * lost_i / (1.0 - mean);
     f = mix(f, even * (1.0 - max(albedo_o, albedo_i)), s.subsurface);
 #endif
-    return (1.0 - s.metallic) * (1.0 - s.transmission) * INV_PI * f * s.base_color;
+    return principled_matte_share(s) * INV_PI * f * s.base_color;
 }
 
 #if HAS_THIN_WALLS
@@ -32,6 +41,6 @@ float principled_through_weight(Surface s, BASE_SHARE albedo_o) {
 #endif
 
 float principled_diffuse_weight(Surface s, BASE_SHARE albedo_o) {
-    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.base_color) * (1.0 - base_grey(albedo_o));
+    return principled_matte_share(s) * luminance(s.base_color) * (1.0 - base_grey(albedo_o));
 }
 #endif

@@ -1,0 +1,117 @@
+"""What lies under the surface of `principled` and `openpbr`: media that light walks in, and those behind glass."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from service.scene.base import OMITTABLE, hint
+from service.scene.color import Reflectance
+from service.scene.medium import Coefficient
+from service.scene.numbers import Length
+from service.scene.texture import AnyFraction, AnyReflectance, ScalarTexture
+
+LARGEST_G = math.nextafter(1.0, 0.0)
+_Anisotropy = Annotated[float, Field(ge=-1, le=1)]
+
+WalkRadius = Annotated[
+    Coefficient | None,
+    OMITTABLE,
+    hint(
+        "Subsurface radius",
+        "How far light goes below the surface between turns, per channel; without it, subsurface is a flatter shade.",
+        group="Subsurface",
+        unit="m",
+        widget="color",
+        soft=1,
+        absent="flat",
+    ),
+]
+Depth = Annotated[
+    Length,
+    hint(
+        "Transmission depth",
+        "How far inside light takes the transmission colour; 0: it is tinted where it passes the surface.",
+        group="Transmission",
+        unit="m",
+        widget="slider",
+        soft=1,
+    ),
+]
+Scatter = Annotated[
+    Reflectance,
+    hint(
+        "Transmission scatter",
+        "How much of the light turns inside, over the transmission depth.",
+        group="Transmission",
+        unit="",
+        widget="color",
+    ),
+]
+ScatterAnisotropy = Annotated[
+    _Anisotropy,
+    hint(
+        "Scatter anisotropy",
+        "The mean cosine of a turn inside: above 0 light goes on, below 0 it comes back.",
+        group="Transmission",
+        unit="",
+        widget="slider",
+    ),
+]
+Weight = Annotated[
+    AnyFraction,
+    hint(
+        "Subsurface",
+        "Share of the diffuse light that walks below the surface, as in skin, wax or milk.",
+        known_as="subsurface",
+        group="Subsurface",
+        unit="",
+        widget="slider",
+    ),
+]
+Color = Annotated[
+    AnyReflectance,
+    hint("Subsurface colour", "What much of it shows head-on.", group="Subsurface", unit="", widget="color"),
+]
+Radius = Annotated[
+    Length,
+    hint(
+        "Subsurface radius",
+        "How far light goes below the surface between turns; 0: it comes back where it enters.",
+        group="Subsurface",
+        unit="m",
+        widget="slider",
+        soft=1,
+    ),
+]
+RadiusScale = Annotated[
+    Reflectance,
+    hint("Radius scale", "A factor on the radius, per channel.", group="Subsurface", unit="", widget="color"),
+]
+Anisotropy = Annotated[
+    _Anisotropy,
+    hint(
+        "Subsurface anisotropy",
+        "The mean cosine of a turn: above 0 light goes on, below 0 it comes back.",
+        group="Subsurface",
+        unit="",
+        widget="slider",
+    ),
+]
+
+
+def open_interval(g: float) -> float:
+    """A mean cosine whose phase function exists."""
+    return min(max(g, -LARGEST_G), LARGEST_G)
+
+
+def factor_of(value: float | ScalarTexture) -> float:
+    """A number, or the factor on the texture that gives it."""
+    return value.factor if isinstance(value, ScalarTexture) else value
+
+
+def radii(radius: float, scale: Any) -> tuple[float, float, float]:
+    red, green, blue = scale
+    return radius * red, radius * green, radius * blue

@@ -1,0 +1,100 @@
+// Walks under a surface: light that enters there is scattered by an index-matched medium and comes out elsewhere, evenly in
+// all directions, as far as the surface lets it out. A walk stays in its shape and passes all others. It counts as one
+// event, and ends after WALK_STEPS steps, which is a bias: docs/price.md has it.
+
+// Whether the path is under a surface, or comes out.
+bool walk_under(Path path) {
+#if HAS_WALKS
+    return path.walks || path.exits;
+#else
+    return false;
+#endif
+}
+
+bool walk_goes_on(Path path) {
+#if HAS_WALKS
+    return path.walks;
+#else
+    return false;
+#endif
+}
+
+bool walk_ends(Path path) {
+#if HAS_WALKS
+    return path.exits;
+#else
+    return false;
+#endif
+}
+
+#if HAS_WALKS
+const uint WALK_STEPS = 256u;
+
+// A random number of this step, apart from those of whole paths.
+float walk_random(Sampler rng, Path path, uint which) {
+    uint bits = sobol_bits(rng, sobol_bounce_pair(path.bounce) + PAIR_ROULETTE).y;
+    bits = sobol_hash(bits ^ (4u * path.steps + which) * 0x9e3779b9u);
+    return float(bits >> 8u) / 16777216.0;
+}
+
+// The medium under the surface. Its albedo of single scattering gives a half space of it the material's colour head-on under
+// a constant sky: Hapke's H [1981, "Bidirectional reflectance spectroscopy"] for 1 - H(1) sqrt(1 - albedo), with his
+// similarity for another mean cosine.
+Medium walk_medium(Material m, float least) {
+    vec3 color = clamp(m.model == MODEL_PRINCIPLED ? m.base_color : m.subsurface_color, 0.0, 1.0);
+    vec3 root = (1.0 - color) / (1.0 + 2.0 * color), alike = 1.0 - root * root;
+    Medium r = medium_none();
+    r.depth = 1.0;
+    r.rate = 1.0 / max(m.subsurface_radius, vec3(least));
+    r.scattering = r.rate * alike / (1.0 - m.subsurface_g + m.subsurface_g * alike);
+    r.forward = m.subsurface_g * dot(r.scattering, vec3(1.0 / 3.0));
+    return r;
+}
+
+// Takes the path under the surface where it is.
+void walk_begin(Material m, inout Path path) {
+    path.walks = true;
+    path.walked++;
+    path.steps = 0u;
+    path.walk_shape = path.at.shape;
+    path.outside = path.medium;
+    path.medium = walk_medium(m, 4.0 * dot(abs(path.at.ng), path.at.error)); // else the ray would begin deep within
+}
+
+// Finds out whether the walk has come to its surface.
+void walk_arrive(inout Path path) {
+    path.exits = path.walks && path.hit.id != NONE && !path.in_medium && path.at.shape == path.walk_shape
+        && dot(path.at.ng, path.d) > 0.0;
+    path.steps++;
+    if (path.exits) {
+        path.walks = false;
+        path.steps = 0u;
+        path.medium = path.outside;
+    }
+    if (!path.walks) path.steps = 0u;
+}
+
+// Takes the walk on from a particle, or past another surface.
+void walk_step(Sampler rng, inout Path path) {
+    if (path.in_medium) {
+        float g = path.medium.forward / max(dot(path.medium.scattering, vec3(1.0 / 3.0)), 1e-30);
+        vec3 w = phase_sample(g, vec2(walk_random(rng, path, 1u), walk_random(rng, path, 2u)));
+        path.d = basis_to_world(basis_make(-path.d), w);
+        path.o = path.at.p;
+    } else {
+        path.o = shapes_leave(path.at, path.d);
+    }
+}
+
+// Describes the place where light comes out, as seen from outside.
+void walk_interaction(Path path, inout Interaction here) {
+    here.exits = path.exits;
+    if (path.exits) {
+        here.front = here.fold = here.facing = path.at.ng;
+        here.basis = basis_make(path.at.ns);
+        here.wo = vec3(0.0, 0.0, 1.0);
+        here.behind = here.mapped = here.transmits = false;
+        here.beyond = path.medium;
+    }
+}
+#endif
