@@ -33,6 +33,7 @@ from tests.supervisors import Ears, with_supervisor
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}
 KEPT = 4  # disk caches
+QUICKLY = {"GALLIVM_PERF": "nopt"}  # LLVM optimises nothing, and takes half the time
 AHEAD = """
 from gpu import RenderSettings
 from gpu.precompile import fallback
@@ -150,7 +151,7 @@ def compiled_ahead(digest: str) -> Path:
     if not folder.exists():
         making = folder.with_suffix(f".{os.getpid()}")
         making.mkdir(parents=True)
-        environment = os.environ | {"MESA_SHADER_CACHE_DIR": str(making)}
+        environment = os.environ | QUICKLY | {"MESA_SHADER_CACHE_DIR": str(making)}
         done = subprocess.run([sys.executable, "-c", AHEAD], env=environment, capture_output=True, text=True)
         assert done.stdout.strip() == "True", done.stderr
         making.rename(folder)
@@ -185,6 +186,8 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
     digest = wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
     shutil.copytree(compiled_ahead(digest), tmp_path / "cache")
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "cache"))
+    for name, value in QUICKLY.items():
+        monkeypatch.setenv(name, value)
     # On a busy machine there is no time that nobody else wants, in which the kernel is asked for.
     (tmp_path / "sitecustomize.py").write_text("import os\nos.sched_setscheduler = lambda *_: None\n")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", os.getcwd())]))

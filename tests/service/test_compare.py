@@ -138,10 +138,10 @@ def test_other_ways_to_the_same_light_do_not_differ(http: httpx.Client) -> None:
 
 
 def test_renders_of_other_seeds_do_not_differ_and_stay_as_they_are(http: httpx.Client) -> None:
-    """Forty pairs, of which two alarm at a level of 0.05."""
-    ids = [ended(http, size=16, samples=8, seed=seed) for seed in range(80)]
+    """Twenty pairs, of which one alarms at a level of 0.05."""
+    ids = [ended(http, size=16, samples=8, seed=seed) for seed in range(40)]
     p = [compare(http, a, b, confidence=1 - LEVEL)["p_value"] for a, b in zip(ids[::2], ids[1::2], strict=True)]
-    assert sum(each < LEVEL for each in p) <= 7  # more come once in a thousand
+    assert sum(each < LEVEL for each in p) <= 5  # more come once in a thousand
     assert status(http, ids[0])["samples"] == 8
     other = ended(http, changed("/materials/ball/base_color", [0.2, 0.6, 0.8]), size=16, samples=8)
     assert compare(http, ids[0], other)["different"]

@@ -157,7 +157,7 @@ def test_renders_with_large_documents_share_little_memory_after_a_restart(gpu: R
     try:
         image = server.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL})
         assert image.status_code == 200
-        assert {status(server, id, 60)["state"] for id in ids} == {"done"}
+        assert {status(server, id, PATIENCE_S)["state"] for id in ids} == {"done"}
         assert "has to wait" in server.log.read_text()
     finally:
         kill(server)

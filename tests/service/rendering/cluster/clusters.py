@@ -58,7 +58,7 @@ async def with_pool(cluster: Cluster, test: Callable[[Pool], Awaitable[None]]) -
         await pool.close()
 
 
-async def until(condition: Callable[[], object], patience_s: float = 40.0) -> None:
+async def until(condition: Callable[[], object], patience_s: float = 90.0) -> None:
     by = asyncio.get_running_loop().time() + patience_s
     while not condition():
         assert asyncio.get_running_loop().time() < by

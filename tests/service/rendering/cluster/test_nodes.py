@@ -35,7 +35,7 @@ def test_it_shrinks_to_nothing_and_grows(gpu: Renderer, nodes: Nodes) -> None:
             with pytest.raises(Unavailable, match="no node with 1 CPU free for a renderer"):
                 await pool.ready(0)
             node = nodes.add()
-            await pool.ready(30)
+            await pool.ready(90)
             _, ears = await begun(pool, ENDLESS)
             await ears.next(Checkpoint)
             nodes.remove(node)
