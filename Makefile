@@ -1,6 +1,6 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
-# make bench-test        pass the tests of the benchmarks, which take minutes
+# make long-test         pass the tests that `make test` leaves out: those that take longest, and those of the benchmarks
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/service/test_hostile.py
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
@@ -16,7 +16,7 @@ export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test bench-test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
+.PHONY: run test long-test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -26,13 +26,13 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm and not bench' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm and not bench and not slow' --durations 20
 	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
 	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
 
-bench-test:
+long-test:
 	@.ci/setup test
-	.venv/bin/pytest -m bench
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'slow or bench'
 
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/gpu/test_flags.py tests/shaders/test_furnace.py tests/shaders/test_light.py tests/service/rendering/test_stored_rows.py

@@ -167,6 +167,7 @@ def test_odd_places_stay_sound(gpu: Renderer, row: str) -> None:
     assert row != "slivers" or seen.warnings == ["/shapes/0: 2 degenerate triangles skipped"]
 
 
+@pytest.mark.slow
 def test_settings_at_their_ends_render(gpu: Renderer) -> None:
     made = packed(everything()).arrays
     scene = gpu.load(made)

@@ -72,6 +72,7 @@ def same_picture(*scenes: Scene, gpu: Renderer) -> None:
     assert np.isfinite(pictures[1]).all() and apart.mean() < 0.01, "but for paths on which rounding decides"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
     same_picture(gpu.load(KNOWN[name]), gpu.load_fallback(KNOWN[name]), gpu=gpu)
@@ -98,6 +99,7 @@ def test_the_superset_kernel_shows_what_sliders_make_of_the_scene(gpu: Renderer,
     same_picture(gpu.load(bright), gpu.load_fallback(bright, superset), gpu=gpu)
 
 
+@pytest.mark.slow
 def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
     scene = gpu.load_fallback(KNOWN["PRINCIPLED"])
     means = []
@@ -177,6 +179,7 @@ def test_a_first_look_reports_its_noise(gpu: Renderer, monkeypatch: pytest.Monke
     assert all((report.noise is None) == (report.samples < 2) for report in reports)
 
 
+@pytest.mark.slow
 def test_a_stream_sees_at_once_what_is_compiled_for(
     gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -158,6 +158,7 @@ def test_the_code_of_the_aperture_changes_no_bit_of_a_pinhole(gpu: Renderer) -> 
     assert np.array_equal(*pictures)
 
 
+@pytest.mark.slow
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:
     price = kernel_cost(gpu, _packed("CLEARCOAT").arrays)
     assert {"clearcoat", "disney", "spheres"} <= set(price.raised) and "bvh" in price.spared

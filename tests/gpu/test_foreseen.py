@@ -6,6 +6,8 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.precompile import fallback
 from gpu.precompile.kernel_keys import keys_after_edit
@@ -20,6 +22,7 @@ from tests.serving import PATIENCE_S, SCENE
 from tests.supervisors import SIZE, Ears, arrays_of, with_supervisor
 
 
+@pytest.mark.slow
 def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:
     """As does the first touch of its sliders; and that of opacity, once a stream has begun with it."""
 

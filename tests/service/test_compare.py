@@ -137,6 +137,7 @@ def test_other_ways_to_the_same_light_do_not_differ(http: httpx.Client) -> None:
     assert not compare(http, document(scene), document(scene, estimator="bsdf"))["different"]
 
 
+@pytest.mark.slow
 def test_renders_of_other_seeds_do_not_differ_and_stay_as_they_are(http: httpx.Client) -> None:
     """Twenty pairs, of which one alarms at a level of 0.05."""
     ids = [ended(http, size=16, samples=8, seed=seed) for seed in range(40)]

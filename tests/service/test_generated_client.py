@@ -47,6 +47,7 @@ def generated(package: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return module
 
 
+@pytest.mark.slow
 def test_it_compiles_and_its_types_are_sound(package: Path) -> None:
     assert compileall.compile_dir(package, quiet=1)
     check = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--cache-dir", str(package.parent / "mypy")]

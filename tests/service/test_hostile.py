@@ -111,6 +111,7 @@ def is_fine(answer: httpx.Response) -> bool:
     return fine and meant and not leaks and bool(body["detail"])
 
 
+@pytest.mark.slow
 def test_mutated_documents(modest: Server) -> None:
     rng = random.Random(SEED)
     bases = documents()
@@ -180,6 +181,7 @@ def files() -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_mutated_files(modest: Server) -> None:
     rng = random.Random(SEED)
     good = files()

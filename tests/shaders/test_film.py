@@ -135,7 +135,7 @@ def _albedo(prober: Prober, m: np.ndarray, asks: np.ndarray, samples: int) -> tu
 
 
 @pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("model", ["principled", "openpbr"])
+@pytest.mark.parametrize("model", ["principled", pytest.param("openpbr", marks=pytest.mark.slow)])
 def test_white_under_a_film_loses_little_and_never_gains(prober: Prober, base: str, model: str) -> None:
     """The brightest channel in a furnace, from both sides of what transmits."""
     given = {**BASES[base], "base_color": 1, "roughness": 0}

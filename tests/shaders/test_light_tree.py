@@ -308,6 +308,7 @@ def _both(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Doc, **settings
     return seen[0], seen[1]
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_table(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every shape, light and material, glass and the two-sided among them."""
     tree, table = _both(gpu, monkeypatch, everything(), max_bounces=4)
@@ -337,6 +338,7 @@ def _hall(count: int) -> Doc:
     return document(shapes, {k: MATERIALS[k] for k in ("m", "lamp 3")}, camera=camera)
 
 
+@pytest.mark.slow
 def test_it_pays(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """The relative variance of as many samples in a hall of 100 lamps; less than a third was measured."""
     tree, table = (seen.variance / (seen.color**2 + 0.01) for seen in _both(gpu, monkeypatch, _hall(100), samples=64))

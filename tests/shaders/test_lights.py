@@ -348,5 +348,6 @@ def _crowd() -> dict[str, Any]:
     return document(shapes, materials, lights=lights, environment={"type": "constant", "radiance": 0.2})
 
 
+@pytest.mark.slow
 def test_all_estimators_agree_on_all_lights(gpu: Renderer) -> None:
     assert_estimators_agree(gpu, _crowd())

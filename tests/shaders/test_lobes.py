@@ -158,7 +158,8 @@ def test_layered_models_are_reciprocal(prober: Prober, row: str, inside: int) ->
             np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
 
 
-@pytest.mark.parametrize(("row", "angle"), [(row, angle) for row in LAYERED for angle in (30.0, 50.0, 70.0)])
+@pytest.mark.parametrize("row", LAYERED)
+@pytest.mark.parametrize("angle", [pytest.param(30.0, marks=pytest.mark.slow), 50.0, 70.0])
 def test_layered_samples_follow_their_pdf(prober: Prober, row: str, angle: float) -> None:
     """Over the whole sphere in cells of cosine and azimuth, from outside and from inside."""
     rng = np.random.default_rng(4)

@@ -208,7 +208,7 @@ def test_oddities_come_along_and_are_no_warning(store: AssetStore) -> None:
     """Whether they matter is for the material to say."""
     info = store.add(OBJ + b"v 0 0 1\nf 2 3 1\nf 2 1 4\n", filename="m.obj")
     assert info.warnings is None
-    assert store.mesh(info.id).oddities == MeshOddities(coinciding=1, crowded=1, turned=2)
+    assert store.mesh(info.id).oddities == MeshOddities(coinciding=1, crowded=1, turned=2, rim=2)
 
 
 def test_stl_binary_and_text(store: AssetStore) -> None:

@@ -139,7 +139,14 @@ async def _kill_all(divided: _Divided) -> None:
         divided.kill(renderer)
 
 
-@pytest.mark.parametrize("act", [_nothing, _kill_home, _kill_assistant, _lose_home, _kill_all])
+@pytest.mark.parametrize(
+    "act",
+    [
+        _nothing,
+        _kill_home,
+        *(pytest.param(a, marks=pytest.mark.slow) for a in (_kill_assistant, _lose_home, _kill_all)),
+    ],
+)
 def test_bits_are_those_of_one_renderer(
     act: Callable[[_Divided], Awaitable[None]], alone: dict[str, np.ndarray], impatient: None
 ) -> None:

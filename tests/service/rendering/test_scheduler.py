@@ -204,6 +204,7 @@ def test_only_who_wants_a_frame_is_late() -> None:
     assert scheduler.choose(tasks) is not late
 
 
+@pytest.mark.slow
 def test_what_a_long_turn_took_is_paid_back() -> None:
     scheduler, loads, others = Scheduler(), Turn(), [Turn() for _ in range(31)]
     used = dict.fromkeys(map(id, [loads, *others]), 0.0)

@@ -297,6 +297,7 @@ def test_nobody_gives_way_for_nothing() -> None:
 LONG = ResolvedSettings(**(vars(SETTINGS) | {"width": 96, "height": 96, "max_samples": 400}))
 
 
+@pytest.mark.slow
 def test_what_gave_way_ends_with_the_same_bits(
     gpu: Renderer, tmp_path: Path, impatient: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
