@@ -165,6 +165,7 @@ def defines(
     settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name, flag in FLAGS.items() if not flag.of_settings}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
+    out["ANY_MEDIA"] = int(not raised.isdisjoint(("HAS_MEDIA", "HAS_SCATTERING")))
     out["ANY_CHAINS"] = int(not raised.isdisjoint(("HAS_BVH", "HAS_MIRRORS", "HAS_PRIORITIES", "HAS_WALKS")))
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))

@@ -50,4 +50,4 @@ def ranks(scene: SceneArrays) -> bool:
 
 def attenuates(scene: SceneArrays) -> bool:
     """Whether light is lost along the way."""
-    return bool(_absorbing(scene).any()) or fills(scene)
+    return bool(_absorbing(scene).any()) or fills(scene) or walks(scene)

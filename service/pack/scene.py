@@ -110,7 +110,7 @@ def pack(
         environment=sky.arrays,
         textures=textures,
         spaces=shape_spaces(scene, built.origin),
-        bodies=bodies(scene, bool(((materials["subsurface_radius"] > 0) | (materials["scatter_color"] > 0)).any())),
+        bodies=bodies(scene),
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
     odd = (*odd_meshes(built.meshes.odd, materials, emissive), *odd_media(scene, materials, built.meshes.odd))

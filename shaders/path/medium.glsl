@@ -7,7 +7,7 @@ struct Medium {
 #if HAS_ATTENUATION
     vec3 rate;   // of extinction, 1/m: the sum over all bodies around the ray
     float depth; // the number of these bodies
-#if HAS_MEDIA
+#if ANY_MEDIA
     vec3 scattering; // 1/m
     float forward;   // the mean cosine of scattering, times the mean of its rate
     vec3 emission;   // W / (m^3 sr)
@@ -64,7 +64,7 @@ Medium medium_none() {
     Medium m;
     m.rate = vec3(0.0);
     m.depth = 0.0;
-#if HAS_MEDIA
+#if ANY_MEDIA
     m.scattering = m.emission = vec3(0.0);
     m.forward = 0.0;
 #endif
@@ -134,7 +134,7 @@ Medium medium_of(Bodies bodies) {
 Medium medium_sum(Medium a, Medium b, float times) {
     a.rate += times * b.rate;
     a.depth += times * b.depth;
-#if HAS_MEDIA
+#if ANY_MEDIA
     a.scattering += times * b.scattering;
     a.forward += times * b.forward;
     a.emission += times * b.emission;
@@ -145,7 +145,7 @@ Medium medium_sum(Medium a, Medium b, float times) {
 // Without what rounding leaves of bodies that were left.
 Medium medium_real(Medium m) {
     m.rate = max(m.rate, vec3(0.0));
-#if HAS_MEDIA
+#if ANY_MEDIA
     m.scattering = max(m.scattering, vec3(0.0));
     m.emission = max(m.emission, vec3(0.0));
 #endif
@@ -155,7 +155,7 @@ Medium medium_real(Medium m) {
 Medium medium_entered(Medium m, Medium body) {
 #if HAS_PRIORITIES
     return medium_of(bodies_with(m.bodies, body.bodies));
-#elif HAS_MEDIA
+#elif ANY_MEDIA
     if (m.depth < 0.5) return body;
 #endif
     return medium_sum(m, body, 1.0);
@@ -172,7 +172,7 @@ Medium medium_left(Medium m, Medium body) {
 
 // What two searches both find.
 Medium medium_least(Medium a, Medium b) {
-#if HAS_MEDIA
+#if ANY_MEDIA
     if (a.depth < b.depth) return a;
     return b;
 #else

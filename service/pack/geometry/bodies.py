@@ -15,14 +15,13 @@ from service.scene.shape import CylinderShape
 LARGEST_G = np.nextafter(np.float32(1), np.float32(0))
 
 
-def bodies(scene: Scene, needed: bool = False) -> np.ndarray:
-    """A `layout.Body` for what is outside, and one for each shape; none where nothing is filled, has a priority or is
-    `needed` for another reason."""
+def bodies(scene: Scene) -> np.ndarray:
+    """A `layout.Body` for what is outside, and one for each shape; none where nothing is filled or has a priority."""
     outside = None if scene.environment is None else scene.environment.medium
     media: list[Medium | None] = [outside, *(getattr(shape, "medium", None) for shape in scene.shapes)]
     filled = {i: medium for i, medium in enumerate(media) if medium is not None and not medium.is_empty()}
     ranks = [0, *(getattr(shape, "priority", 0) for shape in scene.shapes)]
-    records = np.zeros(len(media) if needed or filled or any(ranks) else 0, Body.dtype)
+    records = np.zeros(len(media) if filled or any(ranks) else 0, Body.dtype)
     records["priority"] = ranks[: len(records)]
     for i, medium in filled.items():
         _fill(records[i], medium)

@@ -12,7 +12,7 @@ from service.scene.material import openpbr_words
 from service.scene.material.abbe import Abbe, dispersion
 from service.scene.material.conductor import ConductorIndex, Extinction
 from service.scene.material.disney import DisneyMaterial
-from service.scene.material.subsurface import WalkRadius
+from service.scene.material.subsurface import WalkRadius, factor_of
 from service.scene.texture import (
     AnyDegrees,
     AnyFraction,
@@ -272,7 +272,8 @@ class PrincipledMaterial(DisneyMaterial):
 
     def is_filled(self) -> bool:
         """Whether it says by itself what is under its surface."""
-        return self.subsurface_radius is not None and max(self.subsurface_radius) > 0 and not self.is_thin
+        walks = self.subsurface_radius is not None and max(self.subsurface_radius) > 0
+        return walks and factor_of(self.subsurface) > 0 and not self.is_thin
 
     def value(self, name: str) -> Any:
         if name == "abbe":
