@@ -136,7 +136,17 @@ def test_variant_b_becomes_openpbr_with_its_groups_and_lobes(editor: Editor) -> 
     }  # fmt: skip
     folds = page.locator("#panel .fold h3").all_text_contents()
     found = [each for each in folds if each]
-    assert found == ["Base", "Specular", "Coat", "Sheen", "Transmission", "Film", "Emission", "Geometry"]
+    assert found == [
+        "Base",
+        "Specular",
+        "Coat",
+        "Sheen",
+        "Transmission",
+        "Subsurface",
+        "Film",
+        "Emission",
+        "Geometry",
+    ]
     turned = set[str]()
 
     def note(request: Request) -> None:
