@@ -115,7 +115,7 @@ class SceneArrays:
     instance_nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # of all trees
     # Of all shapes, in the document's order, where a material reads a solid texture; else none.
     spaces: np.ndarray = field(default_factory=lambda: _empty(layout.ShapeSpace))
-    # Of all shapes, in the document's order, and of what is outside, where something is filled; else none.
+    # Of what is outside, then of all shapes in order, where one is filled or has a priority; else none.
     bodies: np.ndarray = field(default_factory=lambda: _empty(layout.Body))
     instance_shift: int = 0  # bits of the number of the most triangles that an instance has
     bvh_kinds: frozenset[ShapeKind] = frozenset()

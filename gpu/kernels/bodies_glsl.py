@@ -7,7 +7,7 @@ from gpu.layout import Body, bindings
 
 
 def text() -> str:
-    """The struct and its loader, of shape i of the document."""
+    """The struct and its loader: 0 is what is outside, 1 + i the shape i of the document."""
     members = " ".join(f"{kind.glsl} {name};" for name, kind in Body.members.items())
     return f"""#if HAS_MEDIA
 struct Body {{ {members} }};

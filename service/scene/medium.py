@@ -13,6 +13,7 @@ from service.scene.numbers import LARGEST
 from service.scene.photometry import Radiance
 
 LEAST_RADIUS = 1 / LARGEST
+LARGEST_G = 1 - 2.0**-24  # the largest mean cosine below 1 in single precision, of which there is a phase function
 
 Coefficient = Annotated[Color, PlainValidator(color(LARGEST)), WithJsonSchema(color_schema(LARGEST))]
 

@@ -153,3 +153,15 @@ def test_extreme_media_stay_finite(gpu: Renderer, g: float) -> None:
         medium = {"scattering": scattering, "g": g, "absorption": [0, 1e-9, 1e9], "emission": [0, 1e3, 1e3]}
         image = seen(gpu, [filled(medium, "glass")], 4, environment=WHITE, max_bounces=16)
         assert np.isfinite(image).all() and image.max() <= 2.5e3
+
+
+@pytest.mark.parametrize("g", [1, -1])
+def test_glass_whose_light_turns_not_at_all_or_all_the_way(gpu: Renderer, g: float) -> None:
+    """OpenPBR's range has both ends, of which there is no phase function."""
+    milk = {
+        "type": "openpbr", "transmission_weight": 1, "specular_roughness": 0, "specular_ior": 1.0001,
+        "transmission_color": [0.5] * 3, "transmission_depth": 1, "transmission_scatter": [0.69] * 3,
+        "transmission_scatter_anisotropy": g,
+    }  # fmt: skip
+    image = seen(gpu, [ball("milk")], 16, environment=WHITE, materials={"milk": milk}, max_bounces=64)
+    np.testing.assert_allclose(image, 1, atol=0.03)

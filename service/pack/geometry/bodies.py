@@ -9,10 +9,8 @@ import numpy as np
 from gpu.layout import Body
 from service.pack.geometry.warnings import OddMesh, counted
 from service.scene import Scene
-from service.scene.medium import Medium
+from service.scene.medium import LARGEST_G, Medium
 from service.scene.shape import CylinderShape
-
-LARGEST_G = np.nextafter(np.float32(1), np.float32(0))
 
 
 def bodies(scene: Scene) -> np.ndarray:

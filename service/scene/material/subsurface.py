@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 from pydantic import Field
 
 from service.scene.base import OMITTABLE, hint
 from service.scene.color import Reflectance
-from service.scene.medium import Coefficient
+from service.scene.medium import LARGEST_G, Coefficient
 from service.scene.numbers import Length
 from service.scene.texture import AnyFraction, AnyReflectance, ScalarTexture
 
-LARGEST_G = math.nextafter(1.0, 0.0)
 _Anisotropy = Annotated[float, Field(ge=-1, le=1)]
 
 WalkRadius = Annotated[
