@@ -40,7 +40,7 @@ void main() {
 #if HAS_TEXTURES
             vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
             texture_look(at, cone_footprint(cone_after(cone_begin(d), hit.t), at, d), texels);
-            Material m = texture_material(at, texels);
+            Material m = material_at(at, texels);
 #if HAS_HEIGHTS
             height_normal(at, at.ns);
 #endif

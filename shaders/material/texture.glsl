@@ -223,7 +223,7 @@ void texture_look(SurfacePoint at, Footprint footprint, out vec4 texels[max(TEXT
 }
 
 // The material at the point.
-Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
+Material material_at(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     Material m = material_pick(at.material);
     texture_members(at.material, texels, m);
 #if HAS_VERTEX_COLORS
@@ -233,10 +233,10 @@ Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS
 }
 
 // Likewise, with texels of the point alone.
-Material texture_material(SurfacePoint at) {
+Material material_at(SurfacePoint at) {
     vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
     texture_look(at, footprint_none(), texels);
-    return texture_material(at, texels);
+    return material_at(at, texels);
 }
 
 // The chance that a ray meets the surface at the point. An alpha cutoff is compared with the filtered texel.
@@ -331,5 +331,5 @@ bool texture_coat_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS,
 }
 #endif
 #else
-Material texture_material(SurfacePoint at) { return material_pick(at.material); }
+Material material_at(SurfacePoint at) { return material_pick(at.material); }
 #endif

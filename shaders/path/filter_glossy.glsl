@@ -16,7 +16,7 @@ void filter_glossy_note(bool is_delta, inout Path path) {
 
 // Roughens the material that the path has come to. Measured reflection stays as it is; so do microfacets, whose parameter
 // means something else in each distribution. So do surfaces that light goes straight through: it is sampled there.
-void filter_glossy_roughen(Path path, inout Material m) {
+void filter_glossy_floor(Path path, inout Material m) {
 #if HAS_FILTER_GLOSSY
     float least = uniforms.filter_glossy;
     if (path.spread && !material_goes_straight(material_pick(path.at.material))) {

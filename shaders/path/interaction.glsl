@@ -97,11 +97,11 @@ Interaction interaction_make(inout Path path, out Material m) {
 #if HAS_TEXTURES
     vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
     texture_look(path.at, cone_footprint(path.cone, path.at, path.d), texels);
-    m = texture_material(path.at, texels);
+    m = material_at(path.at, texels);
 #else
     m = material_pick(path.at.material);
 #endif
-    filter_glossy_roughen(path, m);
+    filter_glossy_floor(path, m);
     vec3 smooth_w = sides_normal(path.at, wo_w);
 #if HAS_HEIGHTS
     here.mapped = height_normal(path.at, path.at.ns); // that of the surface on which coat and base lie
@@ -154,7 +154,7 @@ Surface interaction_lone(SurfacePoint at, vec3 w, Medium medium, out Interaction
     here.behind = dot(at.ng, w) < 0.0;
     here.basis = basis_make(sides_normal(at, w));
     here.wo = basis_to_local(here.basis, w);
-    m = texture_material(at);
+    m = material_at(at);
     interaction_tangent(at, m, here);
 #if HAS_PRIORITIES
     bool clear = material_transmits(m) && !material_is_thin(m);

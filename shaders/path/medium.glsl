@@ -197,7 +197,7 @@ Medium medium_at(vec3 from) {
         Hit hit = shapes_nearest(o, d, skip);
         SurfacePoint at = shapes_point(hit, o, d);
         more = hit.id != NONE && layer < MEDIUM_LAYERS && budget_lasts();
-        Material m = texture_material(at);
+        Material m = material_at(at);
         bool counts = more && material_transmits(m) && !material_is_thin(m);
 #if HAS_HIDDEN_SHAPES
         counts = counts && (at.shape & HIDDEN) == 0u;

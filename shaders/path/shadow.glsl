@@ -24,7 +24,7 @@ void shadow_pass(SurfacePoint at, vec3 d, inout Shadow ray) {
     float opacity = 1.0;
 #if HAS_PRIORITIES
     if (medium_hides(ray.medium, at, d)) {
-        Medium body = medium_body(texture_material(at), at.shape);
+        Medium body = medium_body(material_at(at), at.shape);
         if (dot(at.ng, d) > 0.0) ray.medium = medium_left(ray.medium, body);
         else ray.medium = medium_entered(ray.medium, body);
         return;
