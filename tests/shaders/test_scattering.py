@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer
+from gpu.layout.bindings import Slot
 from service.scene.half_space import h_function, single_scattering_albedo
+from tests import stats
 from tests.extremes.scenes import ball, icosphere, quad
+from tests.probing import prober_of
 from tests.rendering import assert_estimators_agree, document, picture, render
 
 Doc = dict[str, Any]
@@ -30,6 +33,29 @@ def seen(gpu: Renderer, shapes: list[Doc], samples: int, **more: Any) -> np.ndar
 
 def filled(medium: Doc, material: str = "clear", **more: Any) -> Doc:
     return ball(material, **more) | {"medium": medium}
+
+
+@pytest.mark.parametrize("g", [-0.99, -0.3, 0.0, 1e-4, 0.6, 0.99])
+def test_turns_follow_the_phase_function(gpu: Renderer, g: float) -> None:
+    """Chi-square over bands of the turn that are equally likely in closed form, and over angles around them."""
+    n, bands, angles = 100_000, 16, 12
+    asks = np.zeros((n, 4), np.float32)
+    asks[:, :2] = np.random.default_rng(7).random((n, 2))
+    (out,) = prober_of(gpu).run("phase.comp", n, {Slot.SUM: asks}, raised=frozenset({"HAS_SCATTERING"}), g=g)
+    wi, pdf = out[:, :3].astype(float), out[:, 3].astype(float)
+    np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, atol=1e-6)
+    turn = -wi[:, 2]  # wo is where the light goes to, so that it came along -z
+    sideways = np.hypot(wi[:, 0], wi[:, 1]) ** 2
+    short = np.where(
+        g * turn > 0, sideways / (1 + np.abs(turn)), 1 - np.sign(g) * turn
+    )  # 1 - |cosine|, to all digits
+    root = np.sqrt((1 - abs(g)) ** 2 + 2 * abs(g) * short)
+    np.testing.assert_allclose(pdf, (1 - g * g) / (4 * np.pi * root**3), rtol=2e-4)
+    share = (1 + turn) / 2 if g == 0 else (1 - g * g) / (2 * g) * (1 / root - 1 / (1 + g))
+    around = np.arctan2(wi[:, 1], wi[:, 0])
+    observed = np.histogram2d(share, around, (bands, angles), [[0, 1], [-np.pi, np.pi]])[0]
+    assert stats.chi_square(observed, np.full_like(observed, n / observed.size)) > stats.sidak(1e-3, 6)
+    assert turn.mean() == pytest.approx(g, abs=4 * turn.std() / math.sqrt(n))
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
