@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 from service.assets.materialx import openpbr
-from service.assets.materialx.surface import NITS, TANGENT, Surface
+from service.assets.materialx.surface import TANGENT, Surface
 from service.assets.materialx.trees import (
     Tree,
     added,
@@ -39,8 +39,6 @@ def standard_surface(s: Surface) -> None:
     is_thin = _thin(s, "thin_walled")
     if s.is_used("subsurface", 0) and is_thin:  # all that the library's own graph scatters goes through then
         base = _translucent(s, base, s.tree("subsurface"), constant(0.0), "subsurface_color")
-    elif s.is_used("subsurface", 0):
-        base = _subsurface(s, base, "subsurface", "subsurface_color")
     base = _through(s, base, "transmission", "transmission_color", "transmission_depth", is_thin)
     base = _under_coat(s, base, "coat", "coat_color")
     s.put("base_color", "base_color", base)
@@ -59,7 +57,6 @@ def standard_surface(s: Surface) -> None:
     s.normal("normal_map", "normal")
     s.lose([
         ("diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
-        ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
         ("coat_anisotropy", 0, "an anisotropic coat is not supported"),
         ("coat_affect_color", 0, DARKER),
@@ -67,50 +64,6 @@ def standard_surface(s: Surface) -> None:
     ])  # fmt: skip
     _metal_edges(s, metalness, "specular_color")
     _tangent(s)
-
-
-def open_pbr_surface(s: Surface) -> None:
-    """OpenPBR Surface 1.1."""
-    metalness = s.tree("base_metalness")
-    base = times(s.tree("base_color"), s.tree("base_weight"))
-    is_thin = _thin(s, "geometry_thin_walled")
-    if s.is_used("subsurface_weight", 0) and is_thin:
-        weight, forward = s.tree("subsurface_weight"), times(s.tree("subsurface_scatter_anisotropy"), 0.5)
-        through, back = added(constant(0.5), forward), added(constant(0.5), times(forward, -1.0))
-        base = _translucent(s, base, times(weight, through), times(weight, back), "subsurface_color")
-    elif s.is_used("subsurface_weight", 0):
-        base = _subsurface(s, base, "subsurface_weight", "subsurface_color")
-    base = _through(s, base, "transmission_weight", "transmission_color", "transmission_depth", is_thin)
-    base = _under_coat(s, base, "coat_weight", "coat_color")
-    s.put("base_color", "base_color", base)
-    s.put("metallic", "base_metalness", metalness, 0.0)
-    # alpha along the tangent is r^2 sqrt(2 / (1 + (1 - a)^2)), across it 1 - a times that.
-    across = complement(s.tree("specular_roughness_anisotropy"))
-    squeezed = quotient(times(across, 2.0), added(constant(1.0), times(across, across)))
-    rounder = times(s.tree("specular_roughness"), raised(squeezed, 0.25))
-    is_stretched = s.is_used("specular_roughness_anisotropy", 0)
-    _roughness(s, "specular_roughness", "specular_roughness_anisotropy", across, rounder if is_stretched else None)
-    _specular(s, s.tree("specular_weight"), s.tree("specular_color"), s.tree("specular_ior"), "specular_ior")
-    s.put("transmission", "transmission_weight", s.tree("transmission_weight"), 0.0)
-    _sheen(s, s.tree("fuzz_weight"), s.tree("fuzz_color"), s.tree("fuzz_roughness"), "fuzz_weight")
-    _coat(s, "coat_weight", "coat_roughness", "coat_ior", "geometry_coat_normal")
-    _film(s, "thin_film_thickness", "thin_film_ior", "thin_film_weight", 1e3)
-    if s.is_used("transmission_dispersion_scale", 0):
-        share = s.number("transmission_dispersion_scale", 0)
-        s.abbe(s.number("transmission_dispersion_abbe_number", 20) / share if share > 0 else 0)
-    light = times(s.tree("emission_color"), times(s.tree("emission_luminance"), NITS))
-    _emission(s, light, "emission_luminance")
-    s.put("alpha", "geometry_opacity", s.tree("geometry_opacity"), 1.0)
-    s.normal("normal_map", "geometry_normal")
-    s.lose([
-        ("base_diffuse_roughness", 0, "a rough diffuse base is not supported and is left out"),
-        ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-        ("coat_roughness_anisotropy", 0, "an anisotropic coat is not supported"),
-    ])  # fmt: skip
-    if s.is_used("coat_weight", 0) and s.is_used("coat_darkening", 0):
-        s.note("coat_darkening", DARKER)
-    _metal_edges(s, metalness, "specular_color")
-    _tangent(s, "geometry_tangent", "geometry_coat_tangent")
 
 
 def gltf_pbr(s: Surface) -> None:
@@ -326,12 +279,6 @@ def _under_coat(s: Surface, base: Tree, weight: str, color: str) -> Tree:
     return times(base, mixed(constant(1.0, 1.0, 1.0), s.tree(color), s.tree(weight)))
 
 
-def _subsurface(s: Surface, base: Tree, weight: str, color: str) -> Tree:
-    s.note(weight, "light does not travel below the surface; the diffuse reflection has its colour and is flatter")
-    s.put("subsurface", weight, s.tree(weight), 0.0)
-    return mixed(base, s.tree(color), s.tree(weight))
-
-
 def _through(s: Surface, base: Tree, weight: str, color: str, depth: str, is_thin: bool) -> Tree:
     """The colour of what light passes through: of the inside where it has a depth, else of the surface."""
     if not s.is_used(weight, 0):
@@ -386,7 +333,7 @@ def _either(suits: Callable[[Surface], bool], better: Reading, otherwise: Readin
 
 MODELS: dict[str, Reading] = {
     "standard_surface": _either(openpbr.suits_standard, openpbr.standard_surface, standard_surface),
-    "open_pbr_surface": _either(openpbr.suits_open_pbr, openpbr.open_pbr_surface, open_pbr_surface),
+    "open_pbr_surface": openpbr.open_pbr_surface,
     "gltf_pbr": gltf_pbr,
     "UsdPreviewSurface": usd_preview_surface,
     "disney_principled": disney_principled,

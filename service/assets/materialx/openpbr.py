@@ -12,7 +12,6 @@ from service.assets.materialx.trees import (
     complement,
     constant,
     mean,
-    mixed,
     quotient,
     raised,
     times,
@@ -26,26 +25,22 @@ SAME = {
     "specular_ior": 1.5, "transmission_weight": 0.0, "transmission_color": 1.0, "coat_weight": 0.0, "coat_color": 1.0,
     "coat_roughness": 0.0, "coat_roughness_anisotropy": 0.0, "coat_ior": 1.6, "coat_darkening": 1.0,
     "fuzz_weight": 0.0, "fuzz_color": 1.0, "fuzz_roughness": 0.5, "geometry_opacity": 1.0,
-    "thin_film_weight": 0.0, "thin_film_thickness": 0.5, "thin_film_ior": 1.4,
+    "thin_film_weight": 0.0, "thin_film_thickness": 0.5, "thin_film_ior": 1.4, "subsurface_weight": 0.0,
+    "subsurface_color": 0.8,
 }  # fmt: skip
-BELOW = "light does not travel below the surface; the diffuse reflection has its colour"
+Triple = tuple[float, float, float]
+BLACK: Triple = (0.0, 0.0, 0.0)
+RADIUS_SCALE: Triple = (1.0, 0.5, 0.25)  # of the library's OpenPBR
 NEGLIGIBLE = 0.5  # a coat whose roughness is at most this share of the base's makes that at most 3 % rougher
-
-
-def suits_open_pbr(s: Surface) -> bool:
-    """Whether `openpbr` loses less: it lacks the insides of bodies, and the diffuse light that thin walls pass."""
-    if s.is_set("geometry_thin_walled"):
-        return not s.is_used("subsurface_weight", 0)
-    return not (s.is_used("transmission_weight", 0) and s.is_used("transmission_depth", 0))
 
 
 def suits_standard(s: Surface) -> bool:
     """Whether more is used that only `openpbr` has than what only `principled` has."""
     is_thin = s.is_set("thin_walled")
-    if is_thin and s.is_used("subsurface", 0):
-        return False
-    if not is_thin and s.is_used("transmission", 0) and s.is_used("transmission_depth", 0):
-        return False
+    if s.is_used("subsurface", 0):
+        return not is_thin
+    if not is_thin and s.is_used("transmission", 0) and s.is_used("transmission_scatter", 0):
+        return True
     gained = int(s.is_used("diffuse_roughness", 0)) + int(
         s.is_used("metalness", 0) and s.is_used("specular_color", 1)
     )
@@ -65,11 +60,13 @@ def open_pbr_surface(s: Surface) -> None:
     """OpenPBR Surface 1.1, whose parameters have the names that `openpbr` has."""
     s.material["type"] = "openpbr"
     for name, default in SAME.items():
-        tree = s.tree(name)
-        if name == "base_color" and s.is_used("subsurface_weight", 0):
-            s.note("subsurface_weight", BELOW)
-            tree = mixed(tree, s.tree("subsurface_color"), s.tree("subsurface_weight"))
-        s.put(name, name, tree, None if s.graphs.is_given(s.node, name) else default)
+        s.put(name, name, s.tree(name), None if s.graphs.is_given(s.node, name) else default)
+    if s.is_used("subsurface_weight", 0):
+        _number(s, "subsurface_radius", s.number("subsurface_radius", 1.0), 1.0)
+        _color(s, "subsurface_radius_scale", s.triple("subsurface_radius_scale", RADIUS_SCALE), RADIUS_SCALE)
+        _number(s, "subsurface_scatter_anisotropy", s.number("subsurface_scatter_anisotropy", 0.0), 0.0)
+    if s.is_used("transmission_weight", 0):
+        _inside(s)
     if s.is_set("geometry_thin_walled"):
         s.material["geometry_thin_walled"] = True
     _emission(s, "emission_luminance", 1.0)
@@ -81,20 +78,15 @@ def open_pbr_surface(s: Surface) -> None:
         _disperse(
             s, s.number("transmission_dispersion_scale", 0), s.number("transmission_dispersion_abbe_number", 20)
         )
-    s.lose([
-        ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
-    ])  # fmt: skip
 
 
 def standard_surface(s: Surface) -> None:
     """Autodesk Standard Surface 1.0.1."""
     s.material["type"] = "openpbr"
-    base = s.tree("base_color")
-    if s.is_used("subsurface", 0):
-        s.note("subsurface", BELOW)
-        base = mixed(base, s.tree("subsurface_color"), s.tree("subsurface"))
     _set(s, "base_weight", "base")
-    s.put("base_color", "base_color", base)
+    s.put("base_color", "base_color", s.tree("base_color"))
+    if s.is_used("subsurface", 0):
+        _below(s)
     _set(s, "base_diffuse_roughness", "diffuse_roughness")
     _set(s, "base_metalness", "metalness")
     _set(s, "specular_weight", "specular")
@@ -106,6 +98,7 @@ def standard_surface(s: Surface) -> None:
     if s.is_used("transmission", 0):
         _set(s, "transmission_weight", "transmission")
         _set(s, "transmission_color", "transmission_color")
+        _inside(s)
         if s.is_used("transmission_dispersion", 0):
             _disperse(s, 1.0, s.number("transmission_dispersion", 0))
     if s.is_used("thin_film_thickness", 0):
@@ -125,9 +118,38 @@ def standard_surface(s: Surface) -> None:
     s.put("geometry_opacity", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("geometry_normal", "normal")
     s.lose([
-        ("transmission_scatter", 0, "scattering inside is not supported and is left out"),
         ("transmission_extra_roughness", 0, "a roughness of the transmission alone is not supported"),
     ])  # fmt: skip
+
+
+def _inside(s: Surface) -> None:
+    """What light meets between two refractions, which both nodes describe alike."""
+    _number(s, "transmission_depth", s.number("transmission_depth", 0.0), 0.0)
+    _color(s, "transmission_scatter", s.triple("transmission_scatter", BLACK), BLACK)
+    _number(s, "transmission_scatter_anisotropy", s.number("transmission_scatter_anisotropy", 0.0), 0.0)
+
+
+def _below(s: Surface) -> None:
+    """The subsurface of Standard Surface, whose radius is a colour times a scale."""
+    _set(s, "subsurface_weight", "subsurface")
+    s.put("subsurface_color", "subsurface_color", s.tree("subsurface_color"))
+    radius, scale = s.triple("subsurface_radius", (1.0, 1.0, 1.0)), s.number("subsurface_scale", 1.0)
+    most = max(radius)
+    share = (radius[0] / most, radius[1] / most, radius[2] / most) if most > 0 else (1.0, 1.0, 1.0)
+    _number(s, "subsurface_radius", most * scale, 1.0)
+    _color(s, "subsurface_radius_scale", share, RADIUS_SCALE)
+    _number(s, "subsurface_scatter_anisotropy", s.number("subsurface_anisotropy", 0.0), 0.0)
+
+
+def _number(s: Surface, parameter: str, found: float, default: float) -> None:
+    least, most = (-1.0, 1.0) if parameter.endswith("anisotropy") else (0.0, LARGEST)
+    if found != default:
+        s.material[parameter] = min(max(found, least), most)
+
+
+def _color(s: Surface, parameter: str, found: Triple, default: Triple) -> None:
+    if found != default:
+        s.material[parameter] = [min(max(each, 0.0), 1.0) for each in found]
 
 
 def _disperse(s: Surface, scale: float, abbe: float) -> None:

@@ -26,7 +26,7 @@ RANGES = {
 }  # fmt: skip
 COLORS = (
     "base_color", "attenuation_color", "specular_color", "sheen_color", "emission", "transmission_color",
-    "coat_color", "fuzz_color", "emission_color", "diffuse_transmission_color",
+    "coat_color", "fuzz_color", "emission_color", "subsurface_color", "diffuse_transmission_color",
 )  # fmt: skip
 NITS = 1 / 683  # watts of a lumen
 TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
@@ -71,6 +71,16 @@ class Surface:
             self.note(name, f"a value that differs from place to place is not supported here; {otherwise:g} is used")
             return otherwise
         return found[0]
+
+    def triple(self, name: str, otherwise: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The colour of an input that must be the same everywhere."""
+        found = self.constant(name)
+        if found is None:
+            words = " ".join(f"{each:g}" for each in otherwise)
+            self.note(name, f"a colour that differs from place to place is not supported here; {words} is used")
+            return otherwise
+        red, green, blue = found if len(found) == 3 else found[:1] * 3
+        return red, green, blue
 
     def is_used(self, name: str, neutral: float) -> bool:
         """Whether an input is other than the value by which it does nothing."""

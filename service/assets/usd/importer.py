@@ -52,7 +52,7 @@ class _Importer:
         self._pose()
         self.items = Walk(self.stage, self.time, self.notes).items()
         self.textures = Textures(package, self.files, limits, self.notes)
-        self.materials = Materials(self.textures, self.time, self.notes)
+        self.materials = Materials(self.textures, self.time, self.unit, self.notes)
         self.placements = Placements()
         self.lights = Lights(
             self.time, self.unit, self.textures, self.files, self.materials.documents, self.notes

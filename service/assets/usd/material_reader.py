@@ -14,10 +14,11 @@ PASSED = ("normalmap", "convert_", "dot_", "constant_", "extract_", "separate", 
 
 
 class Reader:
-    """The parameters of one surface. `charts` and `is_colored` say what of its meshes it uses."""
+    """The parameters of one surface. `charts` and `is_colored` say what of its meshes it uses; `unit` is how many
+    metres one of the stage's units has."""
 
-    def __init__(self, surface: Node, textures: Textures, notes: Warnings) -> None:
-        self.surface, self.textures, self.notes = surface, textures, notes
+    def __init__(self, surface: Node, textures: Textures, unit: float, notes: Warnings) -> None:
+        self.surface, self.textures, self.unit, self.notes = surface, textures, unit, notes
         self.charts: list[str] = []
         self.is_colored = False
         self._unread = surface  # the node of MaterialX at which reading ended
@@ -52,6 +53,15 @@ class Reader:
             return None
         read = self._read(found, "normal", ())
         return read if isinstance(read, dict) else None
+
+    def constants(self, name: str, default: tuple[float, ...], most: float) -> tuple[float, ...]:
+        """A colour that a texture cannot stand for."""
+        found = self.surface.input(name, default)
+        if isinstance(found, Node):
+            words = " ".join(f"{each:g}" for each in default)
+            self.notes.add(self.surface.at(name), f"a texture is not supported here; {words} is used instead")
+            found = default
+        return tuple(min(max(value, 0.0), most) for value in found)
 
     def constant(self, name: str, default: float, most: float = 1.0, least: float = 0.0) -> float:
         """A number that a texture cannot stand for."""

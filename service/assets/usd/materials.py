@@ -32,6 +32,7 @@ class Bound:
 class Materials:
     textures: Textures
     time: Usd.TimeCode
+    unit: float  # metres per unit of the stage
     notes: Warnings
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
     _bound: dict[str, Bound] = field(default_factory=dict)
@@ -81,14 +82,14 @@ class Materials:
         fallback = preview if preview is not None and preview.kind == PREVIEW else None
         if rich is not None and rich.kind in SURFACES:
             lost = Warnings()
-            read = Reader(rich, self.textures, lost if fallback else self.notes)
+            read = Reader(rich, self.textures, self.unit, lost if fallback else self.notes)
             document = materialx_surface(read)
             if fallback is None or not lost.document():
                 return document, read
             detail = "the MaterialX surface has what is not supported; its UsdPreviewSurface is shown instead"
             self.notes.add(rich.pointer, detail)
         if fallback is not None:
-            read = Reader(fallback, self.textures, self.notes)
+            read = Reader(fallback, self.textures, self.unit, self.notes)
             return preview_surface(read), read
         other: Node | None = rich or preview
         what = f"its surface is {other.kind[:60] or 'code'}" if other else "it has no surface of these"

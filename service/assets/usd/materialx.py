@@ -13,6 +13,7 @@ NITS = 1 / 683  # watts of a lumen
 WHITE = (1.0, 1.0, 1.0)
 HALF = 0.5  # a film that covers so much is nearer to a whole one than to none
 THICKEST, MICROMETRE = 1e4, 1e3  # nm
+RADIUS_SCALE = (1.0, 0.5, 0.25)  # of OpenPBR's own
 
 
 @dataclass(frozen=True)
@@ -126,10 +127,10 @@ def _transmission(read: Reader, names: Names, out: dict[str, Any]) -> None:
         return
     out["transmission"] = share
     _disperse(read, names, out)
-    depth = 0.0 if is_thin else read.constant("transmission_depth", 0.0, 1e9)
+    depth = 0.0 if is_thin else read.constant("transmission_depth", 0.0, 1e9) * read.unit
     color = read.color("transmission_color", WHITE)
     if depth > 0 and isinstance(color, list):
-        out["attenuation_distance"], out["attenuation_color"] = max(depth, 1e-9), color
+        out["attenuation_distance"], out["attenuation_color"] = min(max(depth, 1e-9), 1e9), color
         out["base_color"] = list(WHITE) if share == 1 else out["base_color"]
     elif share == 1:
         out["base_color"] = color
@@ -157,7 +158,7 @@ def _scattered(read: Reader, names: Names, out: dict[str, Any]) -> None:
     if share == 0:
         return
     if "thin_walled" not in out:
-        read.notes.add(read.surface.at(weight), "subsurface scattering is not supported and is left out")
+        _below(read, names, share, read.color(color, (default,) * 3), out)
         return
     forwards = 1.0
     if names is OPEN_PBR:
@@ -172,6 +173,27 @@ def _scattered(read: Reader, names: Names, out: dict[str, Any]) -> None:
     else:
         detail = "of a wall with a texture the colour that comes back is that of the base"
         read.notes.add(read.surface.at(color), detail)
+
+
+def _below(read: Reader, names: Names, share: float, own: Any, out: dict[str, Any]) -> None:
+    """Light walks below the surface of a body. What does not walk has the same colour here."""
+    if names is OPEN_PBR:
+        radius, scale = read.constant("subsurface_radius", 1.0, LARGEST), "subsurface_radius_scale"
+        radii = [radius * each for each in read.constants(scale, RADIUS_SCALE, 1.0)]
+    else:
+        factor = read.constant("subsurface_scale", 1.0, LARGEST)
+        radii = [factor * each for each in read.constants("subsurface_radius", WHITE, LARGEST)]
+    out["subsurface"], out["subsurface_radius"] = share, [min(each * read.unit, LARGEST) for each in radii]
+    base = out["base_color"]
+    if base == own:
+        return
+    if isinstance(own, list) and isinstance(base, list):
+        out["base_color"] = [a + share * (b - a) for a, b in zip(base, own, strict=True)]
+    elif share >= HALF:
+        out["base_color"] = own
+    if share < 1:
+        detail = "the light that walks below the surface and the light that does not have one colour here"
+        read.notes.add(read.surface.at(names.scattered[1]), detail)
 
 
 def _film(read: Reader, names: Names, out: dict[str, Any]) -> None:

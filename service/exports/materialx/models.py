@@ -32,6 +32,9 @@ def standard_surface(m: PrincipledMaterial, graph: Graph) -> Inputs:
         made["subsurface_color"] = (
             made["base_color"] if through is None else graph.color(through, "diffuse_transmission_color")
         )
+    if _is_used(m.subsurface) and m.subsurface_radius is not None and not m.is_thin:
+        made["subsurface"] = graph.number(m.subsurface, "subsurface")
+        made |= {"subsurface_color": made["base_color"], "subsurface_radius": color(m.subsurface_radius)}
     made["specular_roughness"] = graph.number(m.roughness, "roughness")
     if _is_used(m.anisotropic):
         made["specular_anisotropy"] = _scaled(graph, m.anisotropic, "anisotropic", STRETCH)
@@ -140,7 +143,7 @@ def _coat(m: PrincipledMaterial, graph: Graph) -> Inputs:
 
 
 def _tell_others(m: PrincipledMaterial, graph: Graph) -> None:
-    if _is_used(m.subsurface):
+    if _is_used(m.subsurface) and (m.subsurface_radius is None or m.is_thin):
         graph.tell("subsurface", "a flatter diffuse reflection is not written")
     if m.alpha_cutoff is not None:
         graph.tell("alpha_cutoff", "the model has no cut-off; the opacity is written without it")

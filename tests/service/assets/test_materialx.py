@@ -50,18 +50,6 @@ def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> 
             {"SM/diffuse_roughness"},
         ),
         (
-            "open_pbr_surface",
-            [value("base_color", [0.5, 0.25, 0.75]), value("specular_roughness", 0.2),
-             value("transmission_weight", 1), value("transmission_color", [0.9, 0.8, 0.7]),
-             value("transmission_depth", 0.25),
-             value("transmission_dispersion_scale", 0.5), value("emission_luminance", 683),
-             value("thin_film_weight", 1), value("thin_film_thickness", 0.35), value("thin_film_ior", 1.8)],
-            {"base_color": 1.0, "roughness": 0.2, "transmission": 1.0, "attenuation_distance": 0.25,
-             "attenuation_color": [0.9, 0.8, 0.7], "emission": 1.0, "abbe": 40.0,
-             "film_thickness": 350.0, "film_ior": 1.8},
-            set(),
-        ),
-        (
             "gltf_pbr",
             [value("base_color", [0.1, 0.2, 0.3]), value("metallic", 0), value("roughness", 0.6), value("alpha", 0.4),
              value("alpha_mode", 1, "integer"), value("alpha_cutoff", 0.3), value("sheen_color", [0.2, 0.1, 0]),
@@ -305,14 +293,14 @@ def test_a_mtlx_in_a_texture_set_wins_and_two_files_are_told_apart(store: AssetS
 
 
 def test_it_is_served_and_a_file_is_no_mesh(server: Server) -> None:
-    scatters = value("transmission_scatter", [0.1, 0.1, 0.1])
-    text = mtlx(surface("open_pbr_surface", value("base_color", [0.5, 0.25, 0.125]), scatters))
+    turned = value("geometry_tangent", "1, 0, 0", "vector3")
+    text = mtlx(surface("open_pbr_surface", value("base_color", [0.5, 0.25, 0.125]), turned))
     answer = server.http.post("/v1/assets", content=text, headers={"content-type": "application/octet-stream"})
     assert answer.status_code == 201 and answer.json()["kind"] == "materials" and answer.json()["format"] == "mtlx"
     id = answer.json()["id"]
     found = server.http.get(f"/v1/assets/{id}/materials").json()
     assert found["materials"]["M"]["base_color"] == [0.5, 0.25, 0.125]
-    assert [note["pointer"] for note in found["warnings"]] == ["SM/transmission_scatter"]
+    assert [note["pointer"] for note in found["warnings"]] == ["SM/geometry_tangent"]
     scene = {
         "version": 1, "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
         "materials": {"a": {"type": "diffuse", "albedo": 0.5}},

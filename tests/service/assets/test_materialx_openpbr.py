@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from service.assets import AssetStore
@@ -40,25 +39,64 @@ def test_open_pbr_is_openpbr_without_a_loss(store: AssetStore) -> None:
     assert plain == OpenpbrMaterial(type="openpbr")
 
 
-def test_what_openpbr_has_not_yet_is_listed(store: AssetStore) -> None:
-    unsupported = [
-        value("subsurface_weight", 0.5), value("subsurface_color", 0, "color3").replace('"0"', '"0, 0, 0"'),
-        value("base_color", [0.8, 0.4, 0.2]),
-        value("geometry_tangent", "1, 0, 0", "vector3"),
-        value("transmission_scatter", [0.1, 0.2, 0.3]),
-    ]  # fmt: skip
-    imported = taken(store, mtlx(surface("open_pbr_surface", *unsupported)))
-    assert material(imported) == {"type": "openpbr", "base_color": pytest.approx([0.4, 0.2, 0.1])}
-    assert losses(imported) == {
-        f"SM/{name}" for name in (
-            "subsurface_weight", "geometry_tangent",
-            "transmission_scatter",
-        )
+def test_insides_come_along(store: AssetStore) -> None:
+    """What is not used stays away."""
+    below = {
+        "subsurface_weight": 0.5, "subsurface_color": [0.9, 0.5, 0.25], "subsurface_radius": 0.125,
+        "subsurface_radius_scale": [1.0, 0.25, 0.125], "subsurface_scatter_anisotropy": -0.5,
     }  # fmt: skip
+    inside = {
+        "transmission_weight": 0.5, "transmission_depth": 2.0, "transmission_scatter": [0.25, 0.5, 0.75],
+        "transmission_scatter_anisotropy": 0.5,
+    }  # fmt: skip
+    for parts in (below, inside, below | inside):
+        imported = taken(store, mtlx(surface("open_pbr_surface", *(value(name, x) for name, x in parts.items()))))
+        assert material(imported) == {"type": "openpbr", **parts} and not imported.warnings
+        OpenpbrMaterial.model_validate(material(imported))
+    unused = {name: x for name, x in (below | inside).items() if not name.endswith("_weight")}
+    imported = taken(store, mtlx(surface("open_pbr_surface", *(value(name, x) for name, x in unused.items()))))
+    assert material(imported) == {"type": "openpbr", "subsurface_color": [0.9, 0.5, 0.25]}
+
+
+def test_a_colour_that_must_be_one_is_told(store: AssetStore) -> None:
+    stripes = graph(node("ramplr", "ramp", "color3", value("valuel", [0.0] * 3), value("valuer", [1.0] * 3)))
+    shader = surface(
+        "open_pbr_surface", value("subsurface_weight", 1.0), from_graph("subsurface_radius_scale", "out", "color3")
+    )
+    imported = taken(store, mtlx(stripes, shader))
+    assert losses(imported) == {"SM/subsurface_radius_scale"}
+    assert "subsurface_radius_scale" not in material(imported)
+
+
+def test_a_tangent_of_the_files_own_is_listed(store: AssetStore) -> None:
+    imported = taken(store, mtlx(surface("open_pbr_surface", value("geometry_tangent", "1, 0, 0", "vector3"))))
+    assert material(imported) == {"type": "openpbr"} and losses(imported) == {"SM/geometry_tangent"}
+
+
+def test_skin_of_standard_surface(store: AssetStore) -> None:
+    """Its radius is a colour times a scale; with what scatters inside glass it is `openpbr`, too."""
+    skin = [
+        value("subsurface", 0.75), value("subsurface_color", [0.8, 0.4, 0.2]),
+        value("subsurface_radius", [2, 1, 0.5]), value("subsurface_scale", 0.25), value("subsurface_anisotropy", 0.5),
+    ]  # fmt: skip
+    imported = taken(store, mtlx(surface("standard_surface", *skin)))
+    found = material(imported)
+    assert found["type"] == "openpbr" and not imported.warnings
+    assert found["subsurface_weight"] == 0.75 and found["subsurface_color"] == pytest.approx([0.8, 0.4, 0.2])
+    assert found["subsurface_radius"] == 0.5 and found["subsurface_scatter_anisotropy"] == 0.5
+    assert "subsurface_radius_scale" not in found, "it is what openpbr has by itself"
+    jade = [
+        value("transmission", 1), value("transmission_depth", 2), value("transmission_scatter", [0.5, 0.25, 0.125]),
+        value("transmission_scatter_anisotropy", 0.25),
+    ]  # fmt: skip
+    imported = taken(store, mtlx(surface("standard_surface", *jade)))
+    found = material(imported)
+    assert (found["transmission_depth"], found["transmission_scatter_anisotropy"]) == (2, 0.25)
+    assert found["transmission_scatter"] == [0.5, 0.25, 0.125] and not imported.warnings
 
 
 def test_standard_surface_is_the_model_that_loses_less(store: AssetStore) -> None:
-    """A tinted, stretched coat is OpenPBR's; with a body below it `principled` has more."""
+    """A tinted, stretched coat is OpenPBR's; glass with a tint inside is what `principled` has as well."""
     coat = [
         value("coat", 1), value("coat_color", [0.9, 0.5, 0.2]), value("coat_IOR", 1.6), value("coat_anisotropy", 0.5),
         value("coat_rotation", 0.25), value("specular_roughness", 0.3), value("emission", 2), value("metalness", 1),
@@ -74,11 +112,12 @@ def test_standard_surface_is_the_model_that_loses_less(store: AssetStore) -> Non
     }  # fmt: skip
     assert not imported.warnings
     body = [value("transmission", 1), value("transmission_depth", 2)]
-    assert material(taken(store, mtlx(surface("standard_surface", *coat, *body))))["type"] == "principled"
+    assert material(taken(store, mtlx(surface("standard_surface", *coat, *body))))["transmission_depth"] == 2
+    assert material(taken(store, mtlx(surface("standard_surface", *body))))["type"] == "principled"
 
 
 def test_thin_walls(store: AssetStore) -> None:
-    """Panes are `openpbr`; of what scatters, the part that goes through is `principled`'s."""
+    """All of OpenPBR stays; leaves of Standard Surface are `principled`, which has what goes through."""
     wall, glass = value("geometry_thin_walled", "true", "boolean"), value("transmission_weight", 1)
     depth = value("transmission_depth", 2)  # of an inside, which it has not
     imported = taken(store, mtlx(surface("open_pbr_surface", wall, glass, depth)))
@@ -89,13 +128,9 @@ def test_thin_walls(store: AssetStore) -> None:
         value("subsurface_color", [0.9, 0.8, 0.6]), value("subsurface_scatter_anisotropy", 0.2),
     ]  # fmt: skip
     found = material(taken(store, mtlx(surface("open_pbr_surface", wall, *paper))))
-    assert found["type"] == "principled" and found["thin_walled"] is True and "subsurface" not in found
-    share = 0.5 * 0.5 * 1.2
-    assert found["diffuse_transmission"] == pytest.approx(share)
-    assert found["diffuse_transmission_color"] == pytest.approx([0.9, 0.8, 0.6])
-    # What comes back: half of it the base's, and of the other half 1/2 (1 - 0.2).
-    back = np.array([0.2, 0.2, 0.2]) * 0.5 + np.array([0.9, 0.8, 0.6]) * 0.5 * 0.4
-    np.testing.assert_allclose((1 - share) * np.array(found["base_color"]), back, rtol=1e-5)
+    assert found["type"] == "openpbr" and found["geometry_thin_walled"] is True
+    assert (found["subsurface_weight"], found["subsurface_scatter_anisotropy"]) == (0.5, pytest.approx(0.2))
+    assert found["subsurface_color"] == [0.9, 0.8, 0.6] and found["base_color"] == 0.2
     leaf = [
         value("subsurface", 0.4),
         value("subsurface_color", [0.5, 0.8, 0.1]),

@@ -257,8 +257,27 @@ def test_films_dispersion_and_thin_walls_of_materialx(store: AssetStore) -> None
     # What comes back: half of it the base's, and of the other half one in two.
     back = np.array([0, 0.2, 0.4]) * 0.5 + np.array([1, 1, 0]) * 0.25
     assert 0.75 * np.array(found["base_color"]) == pytest.approx(back)
-    found, told = read("float inputs:subsurface = 0.4", "standard_surface")
-    assert told == ["/Look/S.inputs:subsurface"] and "diffuse_transmission" not in found
+
+
+def test_light_below_the_surface_of_materialx(store: AssetStore) -> None:
+    """Radii are in the stage's units; what walks and what does not get one colour."""
+    skin = """        float inputs:subsurface = 0.5
+        color3f inputs:subsurface_color = (0.8, 0.4, 0.2)
+        color3f inputs:base_color = (0.4, 0.4, 0.4)
+        color3f inputs:subsurface_radius = (1, 0.5, 0.25)
+        float inputs:subsurface_scale = 0.2"""
+    kind = "ND_standard_surface_surfaceshader"
+    found, scene = worn(store, material("Look", skin, kind=kind, output="mtlx:surface"))
+    assert found["subsurface"] == 0.5 and found["subsurface_radius"] == pytest.approx([0.2, 0.1, 0.05])
+    assert found["base_color"] == pytest.approx([0.6, 0.4, 0.3])
+    assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:subsurface_color"]
+    wax = """        float inputs:subsurface_weight = 1
+        color3f inputs:subsurface_color = (0.9, 0.8, 0.7)
+        float inputs:subsurface_radius = 3"""
+    kind = "ND_open_pbr_surface_surfaceshader"
+    found, scene = worn(store, material("Look", wax, kind=kind, output="mtlx:surface"))
+    assert found["subsurface_radius"] == pytest.approx([3, 1.5, 0.75])
+    assert found["base_color"] == pytest.approx([0.9, 0.8, 0.7]) and not scene.warnings
 
 
 def test_images_of_materialx_and_losses_that_the_preview_does_not_have(store: AssetStore) -> None:
