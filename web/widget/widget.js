@@ -4,7 +4,7 @@
 import { beginIds, element } from "../lib/dom.js";
 import { amount, percent } from "../lib/format-text.js";
 import { diff } from "../lib/patch.js";
-import { defaults, property } from "../server/schema.js";
+import { cameraModels, defaults } from "../server/schema.js";
 import { panel } from "./panel.js";
 import { picture } from "./picture.js";
 
@@ -43,7 +43,11 @@ function view({ model, el }) {
     show();
     flush();
   };
-  const camera = () => ({ ...defaults(schema, property(schema, schema, "camera")), ...scene.camera });
+  const camera = () => {
+    const models = cameraModels(schema);
+    const [usual] = Object.keys(models);
+    return { ...defaults(schema, models[scene.camera?.type ?? usual]), ...scene.camera };
+  };
   const move = (changes) => {
     if (scene) change({ ...scene, camera: { ...scene.camera, ...changes } });
   };

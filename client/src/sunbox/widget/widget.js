@@ -130,6 +130,7 @@ const model=(schema,owner,name)=>
 branches(schema,property(schema,owner,name)).find((node)=>node.properties);
 const materialModels=(schema)=>
 variants(schema,property(schema,schema,"materials").additionalProperties);
+const cameraModels=(schema)=>variants(schema,property(schema,schema,"camera"));
 const bound=(nodes,key)=>nodes.map((node)=>node[key]).find((value)=>value !==undefined);
 function step(min,max,whole){
 if(whole)return 1;
@@ -217,7 +218,7 @@ function defaults(schema,owner,names=Object.keys(owner.properties)){
 const known=names.map((name)=>[name,property(schema,owner,name).default]);
 return Object.fromEntries(known.filter(([,value])=>value !==undefined&&value !==null));
 }
-return { defaults, fields, followed, materialModels, model, property, variants };
+return { cameraModels, defaults, fields, followed, materialModels, model, property, variants };
 })();
 const lib_color = (() => {
 const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
@@ -1416,7 +1417,7 @@ const widget_widget = (() => {
 const { beginIds, element } = lib_dom;
 const { amount, percent } = lib_format_text;
 const { diff } = lib_patch;
-const { defaults, property } = server_schema;
+const { cameraModels, defaults } = server_schema;
 const { panel } = widget_panel;
 const { picture } = widget_picture;
 const PATIENCE_MS=2000;
@@ -1451,7 +1452,11 @@ scene=next;
 show();
 flush();
 };
-const camera=()=>({...defaults(schema,property(schema,schema,"camera")),...scene.camera});
+const camera=()=>{
+const models=cameraModels(schema);
+const [usual]=Object.keys(models);
+return{...defaults(schema,models[scene.camera?.type ?? usual]),...scene.camera};
+};
 const move=(changes)=>{
 if(scene)change({...scene,camera:{...scene.camera,...changes}});
 };
