@@ -31,9 +31,9 @@ export class OnDemand {
     return (...given) => this.get().then((part) => part[name](...given), this.complain);
   }
 
-  // It is loaded as a hand comes near a button. What goes wrong is said when that is pressed.
+  // It is loaded as a hand comes near a button, or a part of the page. What goes wrong is said when that is pressed.
   nears(button) {
-    for (const near of ["pointerenter", "focus"]) button.addEventListener(near, () => this.get().catch(() => {}));
+    for (const near of ["pointerenter", "focusin"]) button.addEventListener(near, () => this.get().catch(() => {}));
   }
 
   // What opens only with the part's own content waits for it.

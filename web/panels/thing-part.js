@@ -19,11 +19,13 @@ export class ThingPart {
   constructor(find, { schema, acts, stage, environments }) {
     Object.assign(this, { schema, acts, stage, environments });
     this.#find = find;
-    this.environmentPart = new OnDemand(
-      () => import("./environment-part.js"),
-      ({ EnvironmentPart }) => new EnvironmentPart(find("environment-ball"), acts),
-      { complain: (problem) => acts.complain(problem), arrived: (part) => part.show(this.environment) },
+    // What environments and bodies have besides: it comes with a selection, or as a hand comes near.
+    this.more = new OnDemand(
+      () => import("./thing-more.js"),
+      ({ ThingMore }) => new ThingMore(find, { schema, acts }),
+      { complain: (problem) => acts.complain(problem), arrived: () => this.#showMore(acts.state.scene) },
     );
+    this.more.nears(find("page-properties"));
     find("camera-type").append(
       ...Object.keys(cameraModels(schema)).map((type) => element("option", { value: type }, inWords(type))),
     );
@@ -42,6 +44,7 @@ export class ThingPart {
   show({ scene, chosen }) {
     const all = things(scene);
     const isMaterial = chosen.thing.startsWith("/materials/");
+    const before = this.thing;
     this.thing = isMaterial || all.some(({ thing }) => thing === chosen.thing) ? chosen.thing : "/camera";
     const own = all.find(({ thing }) => thing === this.thing);
     this.#find("thing-part").hidden = !own;
@@ -49,10 +52,9 @@ export class ThingPart {
     this.#find("material-part").hidden = Boolean(own) && !this.thing.startsWith("/shapes/");
     if (own) this.#showThing(scene, own);
     else this.#made = null;
-    this.environment = this.thing === "/environment" ? (scene.environment ?? null) : null;
-    if (this.environment && !this.environmentPart.now)
-      this.environmentPart.get().catch(this.environmentPart.complain);
-    this.environmentPart.now?.show(this.environment);
+    const isWanted = this.thing === "/environment" || at(scene, this.thing)?.medium;
+    if (isWanted || (before && before !== this.thing)) this.more.get().catch(this.more.complain);
+    this.#showMore(scene);
     const { environment } = chosen;
     const name = this.environments.find((each) => each.name === environment)?.title;
     this.#find("environment-name").textContent =
@@ -64,7 +66,12 @@ export class ThingPart {
     const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[
       this.thing.split("/")[1]
     ];
-    return models(this.schema)[document?.type];
+    return models?.(this.schema)[document?.type];
+  }
+
+  #showMore(scene) {
+    const owner = this.#model(at(scene, this.thing));
+    this.more.now?.show(scene, this.thing, owner);
   }
 
   #showThing(scene, { title }) {
@@ -162,10 +169,11 @@ export class ThingPart {
       const [name] = wrong.slice(place.length + 7).split("/");
       if (form.mark(name, text)) return `/scene${place}/${name}`;
     }
-    return null;
+    return this.more.now?.mark(wrong, text) ?? null;
   }
 
   forgive() {
     for (const { form } of this.#forms) form.forgive();
+    this.more.now?.forgive();
   }
 }
