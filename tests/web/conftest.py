@@ -177,6 +177,9 @@ class Editor:
         digits = "".join(filter(str.isdigit, self.text("#samples").split("/")[0]))
         return int(digits or 0)
 
+    def is_clean(self) -> bool:
+        return self.samples() >= 16 or self.text("#state") == "Done"
+
     def pixels(self) -> list[float]:
         """The canvas in 8x8 averages of red, green and blue: too coarse for noise to count."""
         values: list[float] = self.page.evaluate("""() => {
@@ -188,11 +191,11 @@ class Editor:
         return values
 
     def settled(self) -> list[float]:
-        """The pixels after enough samples at full size that noise is no reason to differ."""
+        """The pixels after enough samples at full size that neither noise nor a guess is a reason to differ."""
         ready = "#stage[aria-busy=false]"
         self.wait(
             "a settled picture",
-            lambda: self.page.query_selector(ready) and self.page.is_hidden("#preview") and self.samples() >= 4,
+            lambda: self.page.query_selector(ready) and self.page.is_hidden("#preview") and self.is_clean(),
         )
         return self.pixels()
 

@@ -264,6 +264,7 @@ def test_a_lost_server_is_told_and_found_again(context: BrowserContext, mortal: 
     first = editor.settled()
     drag(editor, 150, 0)
     editor.wait_for_change(first)
+    editor.wait("few traces of the guess", lambda: editor.samples() >= 64)
     before = editor.settled()
     mortal.stop()
     try:
@@ -273,6 +274,6 @@ def test_a_lost_server_is_told_and_found_again(context: BrowserContext, mortal: 
     finally:
         mortal.start()
     editor.wait("the connection", lambda: editor.text("#messages") == "")
-    editor.wait("a fresh picture", lambda: editor.samples() >= 1)
+    editor.wait("a fresh picture", lambda: editor.samples() >= 64)
     editor.settled()
     assert not editor.differs(before), "the view that was lost comes back"
