@@ -1,8 +1,8 @@
 // Rays to lights. Surfaces with an opacity below 1 let a share of the light pass, and so do those that light goes straight
 // through; all others hide it.
 #if ANY_VEILS
-// The type of a share of light: a colour where panes may tint it.
-#if HAS_STRAIGHT
+// The type of a share of light: a colour where panes or media may tint it.
+#if HAS_STRAIGHT || SHADOW_MEDIA
 #define VEIL_SHARE vec3
 #else
 #define VEIL_SHARE float
