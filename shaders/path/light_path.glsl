@@ -4,6 +4,8 @@
 // by which radiance changes at a boundary, does not appear on its way: where the path comes to the camera's side of the
 // surface it is that of the camera's medium, and sides_eta_scale says what it is on the other side.
 //
+// What media take on the way is left out; what particles turn belongs to the camera's paths.
+//
 // Events are counted as on the camera's path, which has one event at the surface before all others: path.bounce begins
 // at 1.
 
@@ -83,7 +85,8 @@ Path light_path_begin(Emission e, Sampler rng) {
     path.at.flat_id = e.skip;
     path.bounce = 1u;
     path.cone = cone_none();
-    path.alive = max_component(e.flux) > 0.0;
+    if (!e.placed) path.throughput = medium_share(medium, INFINITY_T);
+    path.alive = max_component(e.flux * path.throughput) > 0.0;
     return path;
 }
 

@@ -52,6 +52,10 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     path.walked = path.steps = 0u;
     path.outside = medium;
 #endif
+#if HAS_SCATTERING
+    path.in_medium = false;
+    path.distance_u = 0.0;
+#endif
     path.cone = cone_begin(d);
     path.hues = hues_begin(rng, turn);
     caustics_begin(path);

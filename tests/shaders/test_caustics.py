@@ -146,6 +146,7 @@ SHINES = {"type": "diffuse", "albedo": 0, "emission": 6}
 QUAD_LAMP = {"type": "quad", "origin": [-2, 3, -0.5], "u": [0.8, 0, 0], "v": [0, 0, 0.8], "material": "lamp"}
 ROUND_LAMP = {"type": "disk", "center": [-1.6, 3.2, 0.5], "normal": [0.5, -0.7, 0], "radius": 0.5, "material": "lamp"}
 BALL_LAMP = {"type": "sphere", "center": [-1.6, 3.2, 0.5], "radius": 0.4, "material": "lamp"}
+HAZE = {"absorption": [0.02, 0.1, 0.2], "scattering": [0.1, 0.1, 0.02], "g": 0.5}
 AGREE: dict[str, dict[str, Any]] = {
     "a lens": {"camera": PERSPECTIVE | {"aperture_radius": 0.3, "focus_distance": 4}},
     "a panorama": {"camera": {"type": "panorama", "position": [-2, 1.5, 2], "target": [0, 0.3, 0]}},
@@ -153,6 +154,8 @@ AGREE: dict[str, dict[str, Any]] = {
     "tinted": {"ball": GLASS | {"attenuation_color": [0.3, 0.7, 0.9], "attenuation_distance": 0.7}},
     "a quad and a disk": {"lamps": [QUAD_LAMP, ROUND_LAMP]},
     "a ball": {"lamps": [BALL_LAMP]},
+    "a filled ball": {"medium": HAZE},
+    "fog": {"lamps": [BALL_LAMP], "environment": {"type": "constant", "radiance": 0, "medium": HAZE}},
 }
 
 
@@ -160,8 +163,10 @@ AGREE: dict[str, dict[str, Any]] = {
 def test_both_ways_agree(gpu: Renderer, name: str) -> None:
     """The mean of the picture, within four deviations, which are a small part of the caustic's light."""
     how = {"camera": PERSPECTIVE, **AGREE[name]}
-    lamps = how.pop("lamps", [])
+    lamps, medium = how.pop("lamps", []), how.pop("medium", None)
     seen = scene(WIDE_SUN, **how)
+    if medium:
+        seen["shapes"][0]["medium"] = medium
     if lamps:
         seen["lights"], seen["materials"]["lamp"] = [], SHINES
         seen["shapes"] += lamps
