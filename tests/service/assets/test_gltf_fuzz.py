@@ -172,6 +172,7 @@ def test_the_sound_file_is_read(store: AssetStore) -> None:
     assert tried(store, sound().glb()) == ""
 
 
+@pytest.mark.slow
 def test_files_with_a_mistake_are_read_or_refused(store: AssetStore) -> None:
     file, rng, read = sound(), random.Random(6), 0
     for _ in range(FILES):

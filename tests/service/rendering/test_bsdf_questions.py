@@ -106,6 +106,7 @@ def test_pictures_grow_while_its_kernel_is_compiled(gpu: Renderer, cold: Path) -
     with_supervisor(test)
 
 
+@pytest.mark.slow
 def test_the_foreseen_kernels_are_those_that_are_used(gpu: Renderer, cold: Path) -> None:
     """They come from the driver's disk cache, where another process has put them: nothing is added there."""
 

@@ -123,6 +123,7 @@ def test_what_was_stored_is_read_from_there(gpu: Renderer, readable: bool) -> No
     with_supervisor(test, checkpoint_s=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", [None, "max_samples"])
 def test_a_picture_of_an_earlier_version(gpu: Renderer, reason: Any) -> None:
     """It had no blocks of samples: under way it begins again, as other bits would follow; ended it is shown."""

@@ -25,6 +25,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nodes]:
     cluster.close()
 
 
+@pytest.mark.slow
 def test_it_shrinks_to_nothing_and_grows(gpu: Renderer, nodes: Nodes) -> None:
     async def test() -> None:
         cluster = Cluster(nodes.address, 1, False, OPTIONS, nodes_s=0.0)
