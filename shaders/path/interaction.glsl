@@ -129,7 +129,8 @@ Interaction interaction_make(inout Path path, out Material m) {
     interaction_media(m, here, path);
     here.fold = here.front;
     bool level = here.transmits || medium_around(path.medium) || scatter_was(path);
-    bool lifts = terminator_begin(here.front, here.behind, level, path.at);
+    bool exits = walk_ends(path); // from below: what follows is seen from outside
+    bool lifts = terminator_begin(exits ? path.at.ng : here.front, here.behind && !exits, level, path.at);
     if (lifts) here.fold = smooth_w;
     here.facing = here.mapped ? here.fold : here.basis.z; // a folded lobe reaches all directions in front
     scatter_interaction(path, here);

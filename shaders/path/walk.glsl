@@ -57,6 +57,9 @@ void walk_begin(Material m, inout Path path) {
     path.walked++;
     path.steps = 0u;
     path.walk_shape = path.at.shape;
+#if HAS_SMOOTH_NORMALS
+    path.at.lift = vec3(0.0); // what goes under the surface begins at it
+#endif
     path.outside = path.medium;
     path.medium = walk_medium(m, 4.0 * dot(abs(path.at.ng), path.at.error)); // else the ray would begin deep within
 }

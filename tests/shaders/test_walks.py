@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from gpu import Renderer
 from tests.extremes.scenes import ball, icosphere, quad
@@ -135,3 +136,18 @@ def test_milk_in_a_glass_is_given_by_the_glass(gpu: Renderer) -> None:
         scene = document([{**ball("m"), **more}], {"m": material}, **WHITE)
         images.append(render(gpu, scene, 256, max_bounces=32)[..., :3])
     np.testing.assert_allclose(images[0].mean((0, 1)), images[1].mean((0, 1)), rtol=0.01)
+
+
+def test_a_smooth_mesh_shows_what_its_facets_do(gpu: Renderer) -> None:
+    """Walks begin and end at the triangles, on what is hollow, too, wherever vertex normals lift other rays."""
+    ring = trimesh.creation.torus(0.7, 0.35, major_sections=32, minor_sections=16)
+    mesh = {"type": "mesh", "vertices": ring.vertices.tolist(), "faces": ring.faces.tolist(), "material": "m"}
+    material = principled(0.8, subsurface_radius=[0.1, 0.05, 0.01])
+    seen = {"position": [0, -2.5, 2.5], "target": [0, 0, 0], "vfov": 35}
+    smooth, flat = (
+        render(
+            gpu, document([mesh | {"smooth": each}], {"m": material}, camera=seen, **WHITE), 256, max_bounces=8
+        )[..., :3].mean((0, 1))
+        for each in (True, False)
+    )  # fmt: skip
+    np.testing.assert_allclose(smooth, flat, rtol=0.01)
