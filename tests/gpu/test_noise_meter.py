@@ -11,19 +11,24 @@ from gpu import Renderer
 from gpu.layout import METER_REPLICATES
 from gpu.layout.bindings import Slot
 from gpu.picture.noise_meter import FROM, around, draw, inclusion, squared_error
-from tests.gpu.noisy_scenes import FLOOR, SCENES, SHAPES, luminance
+from tests.gpu.noisy_scenes import FLOOR, SCENES, SHAPES, luminance, under_a_lamp
 from tests.rendering import Images, document, picture
 
+FOG = {"type": "constant", "radiance": 0.3, "medium": {"scattering": [0.1, 0.15, 0.2], "absorption": 0.02}}
+SKIN = {"type": "principled", "base_color": [0.8, 0.5, 0.4], "subsurface": 1, "subsurface_radius": [0.2, 0.1, 0.05]}
+TURNED = {"fog": under_a_lamp(FLOOR) | {"environment": FOG}, "skin": under_a_lamp(SKIN)}  # by particles
+SEEN = SCENES | TURNED
 
-@pytest.mark.parametrize("name", SCENES)
+
+@pytest.mark.parametrize("name", [*SCENES, *(pytest.param(name, marks=pytest.mark.slow) for name in TURNED)])
 def test_it_tells_the_truth(gpu: Renderer, name: str) -> None:
     """Within 20 % from 16 samples on, for both samplers; over two seeds, for a picture's own error scatters too."""
     settings: dict[str, Any] = {"width": 64, "height": 64, "max_bounces": 4, "filter": "blackman_harris"}
     assets: Any = Images()
-    halves = [luminance(picture(gpu, SCENES[name], 600, assets, seed=s, **settings)) for s in (11, 12)]
+    halves = [luminance(picture(gpu, SEEN[name], 600, assets, seed=s, **settings)) for s in (11, 12)]
     reference, doubt = (halves[0] + halves[1]) / 2, ((halves[0] - halves[1]) ** 2).mean() / 4
     for sampler in ("sobol", "independent"):
-        made = [picture(gpu, SCENES[name], 1, assets, sampler=sampler, seed=s, **settings) for s in (1, 2)]
+        made = [picture(gpu, SEEN[name], 1, assets, sampler=sampler, seed=s, **settings) for s in (1, 2)]
         for samples in (16, 64):
             squares = []
             for one in made:
