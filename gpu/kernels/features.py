@@ -97,9 +97,8 @@ MOST_SPLATTED = (1 << 27) // SPLAT_BYTES
 def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
     """Whether caustics are traced from the lights. With "auto" they are where that errs less at equal time; never
     where samples follow what was found, nor where surfaces become rough on the way, nor in pictures that a kernel
-    cannot bind as a whole, nor with boundaries that bodies of a higher priority hide."""
+    cannot bind as a whole."""
     able = not settings.adaptive and settings.filter_glossy == 0 and settings.width * settings.height <= MOST_SPLATTED
-    able = able and "HAS_PRIORITIES" not in raised
     flag = {"light": "HAS_CAUSTICS", "auto": "HAS_SHARP_CAUSTICS"}.get(settings.caustics)
     return able and flag is not None and flag in raised
 

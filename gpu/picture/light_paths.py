@@ -102,8 +102,6 @@ class LightPaths:
             ]
         if d.settings.adaptive or d.settings.filter_glossy > 0:
             how = '; they need settings.caustics "light", which goes neither with adaptive nor with filter_glossy'
-        elif "HAS_PRIORITIES" in d.scene.flags:
-            how = "; they are traced from the lights only where no shape has a priority"
         elif d.settings.width * d.settings.height > MOST_SPLATTED:
             how = f"; they are traced from the lights in pictures of at most {MOST_SPLATTED} pixels"
         else:

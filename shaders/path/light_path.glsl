@@ -21,12 +21,25 @@ float light_path_adjoint(vec3 ng, vec3 ns, vec3 d, vec3 next) {
 #endif
 }
 
-// Whether the camera sees the point: a ray from there to the camera meets nothing on its way that the camera's ray would.
-bool light_path_seen(SurfacePoint at, CameraLink link, Sampler rng) {
-    SurfacePoint other;
-    vec3 back = -link.d;
-    Hit hit = transparency_nearest(shapes_leave(at, back), back, at.flat_id, 0u, rng, other);
-    return hit.t >= link.t && budget_lasts();
+// Whether the camera, with that medium around it, sees the point: a ray from there to the camera meets nothing on its way
+// that the camera's ray would.
+bool light_path_seen(SurfacePoint at, CameraLink link, Medium camera_medium, Sampler rng) {
+    vec3 back = -link.d, o = shapes_leave(at, back);
+    float left = link.t;
+    bool seen, passes;
+    do {
+        SurfacePoint other;
+        Hit hit = transparency_nearest(o, back, at.flat_id, 0u, rng, other);
+        seen = hit.t >= left && budget_lasts();
+        passes = false;
+#if HAS_PRIORITIES
+        passes = hit.t < left && budget_lasts() && medium_hides(camera_medium, other, link.d);
+        left -= hit.t;
+        o = shapes_leave(other, back);
+        at = other;
+#endif
+    } while (passes);
+    return seen;
 }
 
 // Sends the path's light from the surface `at`, which it has come to, to the camera.
@@ -54,7 +67,8 @@ void light_path_connect(Path path, SurfacePoint at, vec3 flux, Medium camera_med
     c *= sides_eta_scale(1.0, side, s, 0.0);
     c *= medium_share(view.medium, link.t);
     float most = max_component(c);
-    if (counts && most > 0.0 && most < INFINITY_T && light_path_seen(at, link, rng)) splats_take(link.at, c, odd);
+    counts = counts && most > 0.0 && most < INFINITY_T;
+    if (counts && light_path_seen(at, link, camera_medium, rng)) splats_take(link.at, c, odd);
 }
 
 // Takes the path on by a perfectly specular event; another one ends it.
@@ -103,6 +117,11 @@ void light_path_trace(Medium camera_medium, Sampler rng, bool odd) {
             SurfacePoint at = path.at;
             Material m;
             Interaction here = interaction_make(path, m);
+#if HAS_PRIORITIES
+            path.passes = medium_hides(path.medium, at, path.d);
+            if (path.passes) path_pass(here, path);
+            if (path.passes) continue;
+#endif
             bool whole = material_is_delta(m) && !here.mapped; // it has no other lobe
             bool bent = path.bounce > 1u + path.passed; // else lights are sampled for it
             if (bent && !whole) light_path_connect(path, at, e.flux * path.throughput, camera_medium, rng, odd);

@@ -175,10 +175,3 @@ def test_targets_hold_all_shapes_that_mirror() -> None:
 def test_a_warning_says_what_is_missing(gpu: Renderer, settings: dict[str, Any], said: str) -> None:
     (warned,) = picture(gpu, scene(), 1, **SETTINGS, **settings).warnings
     assert warned.startswith(said)
-
-
-def test_a_warning_says_that_priorities_leave_them_to_the_camera(gpu: Renderer) -> None:
-    ranked = scene()
-    ranked["shapes"][0]["priority"] = 1
-    (warned,) = picture(gpu, ranked, 1, **SETTINGS, caustics="light").warnings
-    assert "are missing" in warned and "no shape has a priority" in warned

@@ -147,6 +147,10 @@ QUAD_LAMP = {"type": "quad", "origin": [-2, 3, -0.5], "u": [0.8, 0, 0], "v": [0,
 ROUND_LAMP = {"type": "disk", "center": [-1.6, 3.2, 0.5], "normal": [0.5, -0.7, 0], "radius": 0.5, "material": "lamp"}
 BALL_LAMP = {"type": "sphere", "center": [-1.6, 3.2, 0.5], "radius": 0.4, "material": "lamp"}
 HAZE = {"absorption": [0.02, 0.1, 0.2], "scattering": [0.1, 0.1, 0.02], "g": 0.5}
+# Bodies by priority: a core that reaches out of the ball, and water around it.
+CORE = {"type": "box", "min": [-0.3, 0.8, -0.3], "max": [0.3, 2.6, 0.3], "material": "core", "priority": 1}
+HELD = {"type": "sphere", "center": [0.3, 1.4, 0.4], "radius": 0.5, "material": "core", "priority": -1}
+WATER = {"type": "box", "min": [-7, -1, -7], "max": [7, 2.0, 7], "material": "water", "priority": -2}
 AGREE: dict[str, dict[str, Any]] = {
     "a lens": {"camera": PERSPECTIVE | {"aperture_radius": 0.3, "focus_distance": 4}},
     "a panorama": {"camera": {"type": "panorama", "position": [-2, 1.5, 2], "target": [0, 0.3, 0]}},
@@ -155,6 +159,8 @@ AGREE: dict[str, dict[str, Any]] = {
     "a quad and a disk": {"lamps": [QUAD_LAMP, ROUND_LAMP]},
     "a ball": {"lamps": [BALL_LAMP]},
     "a filled ball": {"medium": HAZE},
+    "a ball with a core": {"lamps": [CORE, HELD, BALL_LAMP]},
+    "under water": {"lamps": [WATER, HELD, BALL_LAMP], "camera": PERSPECTIVE | {"position": [-2, 1.0, 3]}},
     "fog": {"lamps": [BALL_LAMP], "environment": {"type": "constant", "radiance": 0, "medium": HAZE}},
 }
 
@@ -168,7 +174,8 @@ def test_both_ways_agree(gpu: Renderer, name: str) -> None:
     if medium:
         seen["shapes"][0]["medium"] = medium
     if lamps:
-        seen["lights"], seen["materials"]["lamp"] = [], SHINES
+        seen["lights"] = []
+        seen["materials"] |= {"lamp": SHINES, "core": GLASS | {"ior": 1.3}, "water": GLASS | {"ior": 1.2}}
         seen["shapes"] += lamps
     settings: dict[str, Any] = {"width": 24, "height": 24, "max_bounces": 6, "roulette_depth": 99}
     means, errors, brought = [], [], 0.0
