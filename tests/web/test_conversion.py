@@ -51,7 +51,7 @@ def test_the_sliders_of_microfacet_follow_the_distribution(editor: Editor) -> No
     page.press(editor.field("alpha", "number"), "Enter")
     assert float(page.input_value(alpha)) == pytest.approx(0.5, abs=0.01), "half of the way from 0.001 to 10"
     page.select_option("#panel [data-field=distribution] select", "phong")
-    before = editor.settled()
+    editor.settled()
     assert float(page.input_value(editor.field("alpha", "number"))) == pytest.approx(396, rel=0.01)
     page.fill(alpha, "1")
     editor.wait(
