@@ -116,9 +116,11 @@ void light_path_trace(Medium camera_medium, Sampler rng, bool odd) {
             path.cone = cone_after(path.cone, path.hit.t);
             SurfacePoint at = path.at;
             Material m;
-            Interaction here = interaction_make(path, m);
 #if HAS_PRIORITIES
             path.passes = medium_hides(path.medium, at, path.d);
+#endif
+            Interaction here = interaction_make(path, m);
+#if HAS_PRIORITIES
             if (path.passes) path_pass(here, path);
             if (path.passes) continue;
 #endif
