@@ -289,6 +289,7 @@ class Done:
     progress: Progress
     warnings: list[str]
     saved: SavedPicture | None = None  # of a render that no stream edits; None: no samples
+    traces_caustics: bool = False  # from the lights
 
 
 @dataclass(frozen=True)

@@ -185,8 +185,14 @@ class Stream:
         elif isinstance(message, Done):
             if message.generation == self._flow.generation:
                 progress = message.progress
-                said = {"generation": message.generation, "reason": message.reason}
-                self._done = {"type": "done", **said, "samples": progress.samples, "noise": progress.noise}
+                self._done = {
+                    "type": "done",
+                    "generation": message.generation,
+                    "reason": message.reason,
+                    "samples": progress.samples,
+                    "noise": progress.noise,
+                    "caustics": "light" if message.traces_caustics else "paths",
+                }
                 self._post(self._done)
         elif isinstance(message, Failed):
             self._refuse(error_of(message), message.generation)

@@ -110,7 +110,9 @@ class Ending:
         self._answer()
         progress = self._tracker.progress(self._residency)
         sent = None if saved is None else sent_picture(saved, self._driver)
-        self._send(Done(self._number, self._tracker.generation, reason, progress, self.warnings, sent))
+        caustics = self._residency.loaded is not None and self._residency.full.traces_caustics
+        generation = self._tracker.generation
+        self._send(Done(self._number, generation, reason, progress, self.warnings, sent, caustics))
 
     @property
     def warnings(self) -> list[str]:

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
-from tests.serving import ENDLESS, Client, Server
+from tests.serving import ENDLESS, SMALL, Client, Server
 from tests.serving import client as opened
 from tests.streams import pictures, rises
 
@@ -37,8 +37,25 @@ def test_a_picture_from_start_to_done(client: Client) -> None:
     assert last.samples == 8 and last.scale == 1 and last.noise == done["noise"] > 0
     assert last.mime == "image/jpeg" and (last.width, last.height) == (32, 24)
     assert Image.open(io.BytesIO(last.image)).size == (32, 24)
-    assert last.elapsed_s > 0 and last.eta_s == 0
+    assert last.elapsed_s > 0 and last.eta_s == 0 and done["caustics"] == "paths"
     assert not pictures(client.silence())
+
+
+def test_done_says_that_caustics_were_traced_from_the_lights(client: Client) -> None:
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "glass"}
+    floor = {"type": "quad", "origin": [-4, -1, 4], "u": [8, 0, 0], "v": [0, 0, -8], "material": "floor"}
+    glass = {"type": "principled", "transmission": 1, "roughness": 0}
+    scene = {
+        "version": 1,
+        "camera": {"position": [0, 1, 6], "target": [0, 0, 0]},
+        "materials": {"glass": glass, "floor": {"type": "diffuse", "albedo": 0.5}},
+        "shapes": [ball, floor],
+        "lights": [{"type": "point", "position": [1, 4, 1], "intensity": 20}],
+    }
+    client.start(scene=scene)
+    assert client.finished()[0]["caustics"] == "light"
+    client.start(2, scene=scene, settings=SMALL | {"caustics": "paths"})
+    assert client.finished()[0]["caustics"] == "paths"
 
 
 def test_frames_rise(client: Client) -> None:
