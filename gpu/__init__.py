@@ -35,6 +35,7 @@ from gpu.errors import (
     WrongThread,
 )
 from gpu.footprint import picture_bytes, scene_bytes
+from gpu.kernels.features import LIGHT_PERIOD
 from gpu.layout.pixel_layers import ACCUMULATOR_BYTES
 from gpu.picture.blocks import Band, border_after, stop_after
 from gpu.picture.look import Lut, ViewTable
@@ -53,6 +54,7 @@ __all__ = [
     "ESTIMATORS",
     "FILTERS",
     "FIRST_HIT_AOVS",
+    "LIGHT_PERIOD",
     "SAMPLERS",
     "TONE_MAPS",
     "Band",

@@ -11,6 +11,7 @@ dispatches  dispatches of several lengths and sizes
 readout     resolving, reading back and encoding a picture
 blocks      merging a block of samples, and bands that other renderers trace
 kernels     one kernel for many scenes beside a scene's own
+caustics    traced from the lights, and found by the camera's paths
 pair        one and two processes on the device
 frames      first frames after changes, at the socket of a real server
 """

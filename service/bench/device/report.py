@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-VERSION = 1
+VERSION = 2
 
 Count = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
@@ -125,6 +125,14 @@ class Kernel(_Row):
     time_ratio: Positive
 
 
+class Caustics(_Row):
+    """A sample with caustics that are traced from the lights, beside one whose camera paths find them."""
+
+    scene: str
+    light: Rate
+    paths: Rate
+
+
 class Pair(_Row):
     scene: str
     processes: Count
@@ -162,6 +170,7 @@ class Report(_Row):
     readouts: list[Readout]
     blocks: list[Blocks]
     kernels: list[Kernel]
+    caustics: list[Caustics]
     pairs: list[Pair]
     frames: list[Frames]
     missing: list[Missing]

@@ -12,7 +12,7 @@ from websockets.exceptions import WebSocketException
 
 from gpu.analysis.device_limits import device_limits
 from service.bench import machine
-from service.bench.device import blocks, dispatches, frames, kernels, pair, readout, scenes, trees
+from service.bench.device import blocks, caustics, dispatches, frames, kernels, pair, readout, scenes, trees
 from service.bench.device.isolated import SPAWN, Isolated, Lost
 from service.bench.device.report import Report
 from service.bench.device.stage import MESH, Options, Row
@@ -79,6 +79,8 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
             "trees": _named(run, "orders of trees", trees.measure, trees.SCENES),
             "kernels": [row for name in kernels.SCENES if name in options.scenes
                         for row in _listed(run.part(f"full kernel of {name}", kernels.measure, name, options))],
+            "caustics": [row for name in caustics.SCENES if name in options.scenes
+                         for row in _listed(run.part(f"caustics of {name}", caustics.measure, name, options))],
         }  # fmt: skip
         _name_silence(run, device)
         about = machine.describe(device or {"renderer": None, "version": None})

@@ -51,11 +51,13 @@ def rate(picture: Picture, turn_s: float) -> Row:
     return rates({"": picture}, turn_s)[""]
 
 
-def rates(pictures: Mapping[str, Picture], turn_s: float) -> dict[str, Row]:
+def rates(pictures: Mapping[str, Picture], turn_s: float, period: int = 1) -> dict[str, Row]:
     """A `report.Rate` of each picture, measured in turns for about `turn_s` each, so that a device that gets warm
-    slows all of them."""
+    slows all of them. Each run has a multiple of `period` samples."""
     run_s = turn_s / (RUNS + 1)
-    samples = {name: timing.samples_in(picture, run_s) for name, picture in pictures.items()}
+    samples = {
+        name: period * max(1, timing.samples_in(picture, run_s) // period) for name, picture in pictures.items()
+    }
     seconds: dict[str, list[float]] = {name: [] for name in pictures}
     for _ in range(RUNS):
         for name, picture in pictures.items():

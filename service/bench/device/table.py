@@ -12,7 +12,7 @@ MIB = 1 << 20
 
 def table(report: dict[str, Any]) -> str:
     """A table for each part that has figures, then what could not be measured and why."""
-    parts = (_scenes, _frames, _readouts, _blocks, _slices, _sides, _pairs, _trees, _kernels)
+    parts = (_scenes, _frames, _readouts, _blocks, _slices, _sides, _pairs, _trees, _kernels, _caustics)
     blocks = [_device(report), *("\n".join(part(report)) for part in parts)]
     missing = [f"  {row['what']}: {row['why']}" for row in report["missing"]]
     blocks.append("\n".join(["Not measured:", *missing]) if missing else "")
@@ -153,4 +153,14 @@ def _trees(report: dict[str, Any]) -> list[str]:
 def _kernels(report: dict[str, Any]) -> list[str]:
     head = ("kernel with everything", "compiles in ms", "times as slow")
     rows = [(row["scene"], f"{row['full_compile_ms']:.0f}", f"{row['time_ratio']:.2f}") for row in report["kernels"]]
+    return _columns(head, rows)
+
+
+def _caustics(report: dict[str, Any]) -> list[str]:
+    head = ("caustics, ms/sample", "from lights", "from the camera", "times as slow")
+    rows = [
+        (row["scene"], f"{light:.2f}", f"{paths:.2f}", f"{light / paths:.2f}")
+        for row in report["caustics"]
+        for light, paths in [(row["light"]["ms_per_sample"], row["paths"]["ms_per_sample"])]
+    ]
     return _columns(head, rows)

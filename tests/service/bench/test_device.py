@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from gpu import Renderer
 from gpu.analysis.slices import slices_of
-from service.bench.device import dispatches, frames, isolated, kernels, run, stage, table, trees
+from service.bench.device import caustics, dispatches, frames, isolated, kernels, run, stage, table, trees
 from service.bench.device.report import Report
 from service.cli import main
 
@@ -107,7 +107,7 @@ def test_a_process_is_lost_alone(tmp_path: Path) -> None:
 def test_numbers_in_a_report_are_finite() -> None:
     fields: dict[str, Any] = {name: [] for name, field in Report.model_fields.items() if field.is_required()}
     fields |= {"seconds": 1.0, "took_s": 2.0, "machine": {}, "device": None}
-    assert Report(**fields).version == 1
+    assert Report(**fields).version == 2
     for wrong in ({"took_s": float("nan")}, {"took_s": float("inf")}, {"more": 1}):
         with pytest.raises(ValidationError):
             Report(**fields | wrong)
@@ -144,6 +144,12 @@ def test_one_kernel_for_everything_is_compared(monkeypatch: pytest.MonkeyPatch, 
     row = kernels.measure("cornell-boxes", TINY)
     assert row == {"scene": "cornell-boxes", "full_compile_ms": 900.0, "time_ratio": 1.5}
     assert "1.50" in table._kernels({"kernels": [row]})[-1]
+
+
+def test_caustics_of_both_ways_are_compared(gpu: Renderer) -> None:
+    row = caustics.measure("prism", replace(TINY, seconds=1e-3))
+    assert row["scene"] == "prism" and all(row[way]["ms_per_sample"] > 0 for way in caustics.WAYS)
+    assert table._caustics({"caustics": [row]})[-1].startswith("prism")
 
 
 def test_seconds_are_above_zero(capsys: pytest.CaptureFixture[str]) -> None:
