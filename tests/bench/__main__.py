@@ -116,7 +116,7 @@ def _drag(arguments: argparse.Namespace) -> int:
     output = output_path(arguments.output)
     from tests.bench import under_hand
 
-    figures = under_hand.measure()
+    figures = under_hand.measure(progress)
     print(under_hand.table(figures))
     write_figures(output, figures)
     return 0
