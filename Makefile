@@ -12,6 +12,10 @@
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
+# What `make test` runs in three parts. What fails is tried once more, alone: the machine may have been busy.
+MAIN = 'not browser and not calm and not bench and not slow'
+BROWSER = 'browser and not slow'
+TWO = -n 2 --dist loadfile --no-loadscope-reorder
 export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -26,13 +30,13 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm and not bench and not slow' --durations 20
-	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
-	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
+	.venv/bin/pytest $(TWO) -m $(MAIN) --durations 20 || .venv/bin/pytest -m $(MAIN) --last-failed
+	.venv/bin/pytest $(TWO) -m $(BROWSER) || .venv/bin/pytest -m $(BROWSER) --last-failed
+	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed
 
 long-test:
 	@.ci/setup test
-	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'slow or bench'
+	.venv/bin/pytest $(TWO) -m 'slow or bench'
 
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/gpu/test_flags.py tests/shaders/test_furnace.py tests/shaders/test_light.py tests/service/rendering/test_stored_rows.py

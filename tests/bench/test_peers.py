@@ -133,6 +133,7 @@ def test_runs_are_scaled_to_the_moment() -> None:
     assert summary["mpaths_per_s"] == pytest.approx(40 / 10.5 * 4 / 1e6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", peer_scenes.cases(), ids=lambda case: case.name)
 def test_no_run_shares_its_samples_with_the_reference(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, case: peer_scenes.PeerCase

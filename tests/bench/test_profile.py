@@ -99,6 +99,7 @@ def test_loads_are_timed_by_kind_and_lanes(gpu: Renderer) -> None:
     assert found["storage buffer, uvec4"][0] > found[NOTHING][0]
 
 
+@pytest.mark.slow
 def test_variants_leave_out_one_thing_each(subjects: dict[str, scenes.Subject]) -> None:
     names = {name: [v.name for v in knockouts.variants(subject, 16)] for name, subject in subjects.items()}
     assert {"no textures", "no normal maps", "no transmission", "opaque"} <= set(names["textured"])

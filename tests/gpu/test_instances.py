@@ -17,6 +17,7 @@ from service.scene import parse_scene
 from tests import documents
 from tests.extremes.scenes import LONG, moved, rows
 from tests.gpu.instanced import IMAGES, MIRRORED, Doc, bumpy, two
+from tests.marks import seldom
 from tests.rays import trace
 from tests.rendering import document
 
@@ -83,7 +84,7 @@ def apart(monkeypatch: pytest.MonkeyPatch) -> Any:
     return lambda: monkeypatch.setattr(instances, "LEAST", 10**9)
 
 
-@pytest.mark.parametrize("row", SCENES)
+@pytest.mark.parametrize("row", seldom(SCENES, ["textured, in part there, single-sided"]))
 def test_shared_triangles_look_as_one_s_own(gpu: Renderer, apart: Any, row: str) -> None:
     aovs = ("color", "albedo", "normal", "depth", "shape_id", "material_id")
     if "glass" in row and not LONG:

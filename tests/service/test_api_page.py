@@ -23,6 +23,7 @@ def test_there_are_ten(language: str) -> None:
     assert sorted(tasks(language)) == list(range(11))
 
 
+@pytest.mark.slow
 def test_curl(server: Server, tmp_path: Path) -> None:
     assert shutil.which("curl")
     script = "set -euo pipefail\n" + "\n".join(code for _, code in sorted(tasks("sh").items()))

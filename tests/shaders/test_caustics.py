@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import Picture, Renderer
+from tests.marks import seldom
 from tests.rendering import document, picture
 
 CENTER, RADIUS, INDEX, ALBEDO = np.array([0.0, 1.3, 0.0]), 1.0, 1.5, 0.5
@@ -140,6 +141,33 @@ def test_totals_are_those_of_a_light_tracer(gpu: Renderer, name: str, bounces: i
     assert caustic(made).mean() == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
+def test_a_spot_and_the_sun_of_a_sky_bring_what_a_point_and_a_sun_bring(gpu: Renderer) -> None:
+    """Where the cone holds all of the ball; and in proportion to what a sun brings to the bare floor, within 2 %."""
+    point = LAMPS["point"]
+    aimed = (CENTER - point["position"]).tolist()
+    spot = point | {"type": "spot", "direction": aimed, "inner_angle": 40, "outer_angle": 50}
+    small: dict[str, Any] = {"width": 48, "height": 48}
+    by_point, by_spot = (
+        caustic(picture(gpu, scene(light), 64, caustics="light", **small)).mean() for light in (point, spot)
+    )
+    assert by_spot == pytest.approx(by_point, rel=0.02)
+    elevation = np.degrees(np.arcsin(-TOWARDS[1]))
+    sky = {"type": "sky", "sun_elevation": elevation, "sun_azimuth": np.degrees(np.arctan2(-TOWARDS[0], TOWARDS[2]))}
+    shares = []
+    for environment, lights in ((sky, []), (None, [LAMPS["sun of .53 degrees"]])):
+        surroundings = {"environment": environment} if environment else {}
+        shone = scene(SUN, lights=lights, **surroundings)
+        brought = caustic(picture(gpu, shone, 64, caustics="light", **small)).mean(axis=(0, 1))
+        bare = shone | {"shapes": shone["shapes"][1:]}
+        direct = picture(gpu, bare, 64, max_bounces=1, **small).read()[..., :3].mean(axis=(0, 1))
+        if environment:
+            dome = bare | {"environment": environment | {"sun": False}}
+            direct = direct - picture(gpu, dome, 64, max_bounces=1, **small).read()[..., :3].mean(axis=(0, 1))
+        shares.append(brought / direct)
+    np.testing.assert_allclose(*shares, rtol=0.02)
+
+
 WIDE_SUN = SUN | {"angular_diameter": 20}
 PERSPECTIVE = {"position": [-3, 2.5, 5], "target": [0.5, 0.3, 0], "vfov": 45}
 SHINES = {"type": "diffuse", "albedo": 0, "emission": 6}
@@ -147,6 +175,13 @@ QUAD_LAMP = {"type": "quad", "origin": [-2, 3, -0.5], "u": [0.8, 0, 0], "v": [0,
 ROUND_LAMP = {"type": "disk", "center": [-1.6, 3.2, 0.5], "normal": [0.5, -0.7, 0], "radius": 0.5, "material": "lamp"}
 BALL_LAMP = {"type": "sphere", "center": [-1.6, 3.2, 0.5], "radius": 0.4, "material": "lamp"}
 HAZE = {"absorption": [0.02, 0.1, 0.2], "scattering": [0.1, 0.1, 0.02], "g": 0.5}
+GEM: dict[str, Any] = {
+    "type": "mesh",
+    "vertices": [[0, 1, 0], [1, 0, 0], [0, 0, 1], [-1, 0, 0], [0, 0, -1], [0, -1, 0]],
+    "faces": [[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 1, 4], [5, 1, 2], [5, 2, 3], [5, 3, 4], [5, 4, 1]],
+    "material": "ball",
+    "transform": {"translate": CENTER.tolist(), "rotate": [20, 30, 0]},
+}
 # Bodies by priority: a core that reaches out of the ball, and water around it.
 CORE = {"type": "box", "min": [-0.3, 0.8, -0.3], "max": [0.3, 2.6, 0.3], "material": "core", "priority": 1}
 HELD = {"type": "sphere", "center": [0.3, 1.4, 0.4], "radius": 0.5, "material": "core", "priority": -1}
@@ -161,16 +196,28 @@ AGREE: dict[str, dict[str, Any]] = {
     "a filled ball": {"medium": HAZE},
     "a ball with a core": {"lamps": [CORE, HELD, BALL_LAMP]},
     "under water": {"lamps": [WATER, HELD, BALL_LAMP], "camera": PERSPECTIVE | {"position": [-2, 1.0, 3]}},
+    "a box": {"lamps": [{"type": "box", "min": [-2, 3, 0], "max": [-1.6, 3.4, 0.6], "material": "lamp"}]},
+    "dispersion": {"ball": GLASS | {"abbe": 15}},
+    "a receiver that shines": {"floor": {"type": "principled", "base_color": 0.4, "roughness": 0.3}},
+    "a mesh that is turned": {"body": GEM},
     "fog": {"lamps": [BALL_LAMP], "environment": {"type": "constant", "radiance": 0, "medium": HAZE}},
 }
 
 
-@pytest.mark.parametrize("name", AGREE)
+OFTEN = {"gold", "a filled ball", "a ball with a core", "fog"}
+
+
+@pytest.mark.parametrize("name", seldom(AGREE, AGREE.keys() - OFTEN))
 def test_both_ways_agree(gpu: Renderer, name: str) -> None:
     """The mean of the picture, within four deviations, which are a small part of the caustic's light."""
     how = {"camera": PERSPECTIVE, **AGREE[name]}
     lamps, medium = how.pop("lamps", []), how.pop("medium", None)
+    floor, body = how.pop("floor", None), how.pop("body", None)
     seen = scene(WIDE_SUN, **how)
+    if floor:
+        seen["materials"]["floor"] = floor
+    if body:
+        seen["shapes"][0] = body
     if medium:
         seen["shapes"][0]["medium"] = medium
     if lamps:

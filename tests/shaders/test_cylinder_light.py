@@ -13,6 +13,7 @@ from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
+from tests.marks import seldom
 from tests.probing import prober_of
 from tests.rays import to_world
 from tests.rendering import Images, document, render
@@ -196,7 +197,7 @@ def test_a_closed_cylinder_holds_its_light(gpu: Renderer, estimator: str, transf
     np.testing.assert_allclose(image[..., :3].mean((0, 1)), COLOR * (1 - 0.6**5) / 0.4, rtol=0.01)
 
 
-@pytest.mark.parametrize("caps", [False, True])
+@pytest.mark.parametrize("caps", seldom([False, True], [False]))
 def test_a_mirror_shows_a_second_tube(gpu: Renderer, caps: bool) -> None:
     """The light that a mirror brings where the tube itself is hidden: that of its image behind the mirror, and the
     same whether it is traced from the camera or from the light."""

@@ -15,6 +15,7 @@ from gpu.kernels.source import SHADERS
 from service import colorimetry
 from service.pack import pack
 from service.scene import parse_scene
+from tests.marks import seldom
 from tests.rendering import Images, assert_estimators_agree, document, picture, render
 
 GLASS = {"type": "principled", "transmission": 1, "base_color": 1, "roughness": 0, "ior": 1.5}
@@ -186,7 +187,7 @@ def _checkers(material: dict[str, Any]) -> dict[str, Any]:
     )
 
 
-@pytest.mark.parametrize("roughness", [0, 0.2])
+@pytest.mark.parametrize("roughness", seldom([0, 0.2], [0.2]))
 def test_colours_are_calmer_than_twice_the_light(gpu: Renderer, roughness: float) -> None:
     """Between pictures of 64 samples: the noise of the channels about the luminance, and the luminance's without."""
 

@@ -36,8 +36,16 @@ def _mean(gpu: Renderer, scene: dict[str, Any], samples: int = 4096, **more: Any
     return render(gpu, scene, samples // 16, width=16, height=16, **more).mean((0, 1))
 
 
-@pytest.mark.parametrize("many", [False, True])
-@pytest.mark.parametrize("kind", SHAPES)
+SELDOM = ("ellipsoid", "quad", "box")  # with the tree, where each has a kernel of its own
+
+
+@pytest.mark.parametrize(
+    ("kind", "many"),
+    [
+        *((kind, False) for kind in SHAPES),
+        *(pytest.param(kind, True, marks=[pytest.mark.slow] * (kind in SELDOM)) for kind in SHAPES),
+    ],
+)
 def test_the_camera_looks_through_hidden_shapes(gpu: Renderer, kind: str, many: bool) -> None:
     """Nothing is in the picture but the shadow; through the tree as well."""
     hidden = {**SHAPES[kind], "material": "veil", "visible_to_camera": False}
@@ -67,8 +75,13 @@ def test_hidden_shapes_are_seen_in_reflections_and_light_the_room(gpu: Renderer)
     assert _mean(gpu, _scene([turned], glow), 16).tolist() == [0, 0, 0, 0]  # it faces the camera, and hides
 
 
-@pytest.mark.parametrize(("estimator", "many"), [*((name, False) for name in ESTIMATORS), ("mis", True)])
-@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize(
+    ("kind", "estimator", "many"),
+    [
+        *((kind, name, False) for kind in SHAPES for name in ESTIMATORS),
+        *(pytest.param(kind, "mis", True, marks=[pytest.mark.slow] * (kind in SELDOM)) for kind in SHAPES),
+    ],
+)
 def test_alpha_is_the_chance_of_being_met(gpu: Renderer, kind: str, estimator: str, many: bool) -> None:
     """Black veils over a floor in a point light: what is left is (1 - alpha) to the number of layers, both ways; in
     the tree as well, where a ray that goes into a solid must also come out."""

@@ -16,6 +16,7 @@ from gpu.kernels.features import flags
 from service.pack import pack
 from service.scene import parse_scene
 from tests.extremes.scenes import ball
+from tests.marks import seldom
 from tests.rendering import Images, assert_estimators_agree, document, render
 
 Doc = dict[str, Any]
@@ -102,7 +103,10 @@ LAYERS: dict[str, Doc] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LAYERS)
+SELDOM = ("part", "sheen", "open coat", "open film")  # each has a kernel of its own
+
+
+@pytest.mark.parametrize("name", seldom(LAYERS, SELDOM))
 def test_it_is_what_a_path_finds_that_goes_there(gpu: Renderer, name: str) -> None:
     """Whatever lies on the pane: the share of the light of a lamp is that of its picture behind the pane."""
     more = LAYERS[name]
@@ -136,7 +140,7 @@ BODIES: dict[str, Doc] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("many", [False, True])
+@pytest.mark.parametrize("many", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", BODIES)
 def test_a_body_of_index_1_takes_what_it_attenuates(gpu: Renderer, kind: str, many: bool) -> None:
     """The lamp above it, and within it; and a floor within it."""
@@ -224,6 +228,7 @@ def test_it_is_no_caustic_and_never_blurred(gpu: Renderer, more: Doc) -> None:
     np.testing.assert_allclose(clear / bare, passed(1, 1.5), rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_the_estimators_agree(gpu: Renderer) -> None:
     """A sun of 10 degrees and a ball through a window, a bubble and a body; the camera looks through a pane, too."""
     sun = {"type": "directional", "direction": [-0.3, 0.2, -1], "irradiance": 3, "angular_diameter": 10}

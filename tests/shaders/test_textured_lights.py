@@ -58,7 +58,11 @@ def test_the_light_on_a_floor_is_the_sum_over_the_lamp(gpu: Renderer, shape: str
 
 
 CUT = {"emission_sides": "both", "alpha": {"texture": "s", "channel": "r"}}
-PAIRS = [*((shape, {}) for shape in SHAPES), *((shape, CUT) for shape in ("quad", "sphere", "ellipsoid"))]
+PAIRS = [
+    *(pytest.param(shape, {}, marks=[pytest.mark.slow] * (shape == "ellipsoid")) for shape in SHAPES),
+    ("sphere", CUT),
+    *(pytest.param(shape, CUT, marks=pytest.mark.slow) for shape in ("quad", "ellipsoid")),
+]
 
 
 @pytest.mark.parametrize(("shape", "more"), PAIRS)

@@ -48,17 +48,24 @@ def test_the_colour_stays_whatever_way_light_turns(gpu: Renderer, g: float) -> N
     np.testing.assert_allclose(image[..., :3].mean((0, 1)), 0.6, atol=0.05)
 
 
-@pytest.mark.parametrize(
-    "shape", [ball("m"), {**icosphere("m", 2)}, {"type": "box", "min": [-1] * 3, "max": [1] * 3, "material": "m"}]
-)
+WHITE_BODIES = [ball("m"), icosphere("m", 2), {"type": "box", "min": [-1] * 3, "max": [1] * 3, "material": "m"}]
+WHITE_MATERIALS = {
+    f"{model} {coat}": principled(1.0, subsurface_radius=0.3, clearcoat=coat, clearcoat_roughness=0.2)
+    if model == "principled"
+    else openpbr(1.0, subsurface_radius=0.3, coat_weight=coat, coat_roughness=0.2, coat_darkening=0)
+    for model in ("principled", "openpbr")
+    for coat in (0, 1)
+}
+
+
+@pytest.mark.parametrize("shape", WHITE_BODIES)
 @pytest.mark.parametrize("coat", [0, 1])
 def test_what_is_white_gains_nothing_and_loses_what_the_steps_cut_off(gpu: Renderer, shape: Doc, coat: int) -> None:
-    materials = (
-        principled(1.0, subsurface_radius=0.3, clearcoat=coat, clearcoat_roughness=0.2),
-        openpbr(1.0, subsurface_radius=0.3, coat_weight=coat, coat_roughness=0.2, coat_darkening=0),
-    )
-    for material in materials:
-        made = picture(gpu, document([shape], {"m": material}, **WHITE), 64, max_bounces=8)
+    """One kernel serves all of them, as there is one of each out of sight."""
+    away = [{**body, "transform": {"translate": [50 + 4 * i, 0, 0]}} for i, body in enumerate(WHITE_BODIES)]
+    for model in ("principled", "openpbr"):
+        materials = {**WHITE_MATERIALS, "m": WHITE_MATERIALS[f"{model} {coat}"]}
+        made = picture(gpu, document([shape, *away], materials, **WHITE), 64, max_bounces=8)
         mean = made.read()[..., :3].mean()
         made.release()
         assert 0.95 < mean < 1.003

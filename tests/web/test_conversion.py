@@ -112,6 +112,7 @@ def test_going_back_to_a_model_brings_back_what_was_there(editor: Editor) -> Non
     assert editor.text("#messages") == "" and editor.complaints == []
 
 
+@pytest.mark.slow
 def test_variant_b_becomes_openpbr_with_its_groups_and_lobes(editor: Editor) -> None:
     """Coat and sheen come along; each group of the schema is a fold, and each lobe has a curve."""
     editor.settled()

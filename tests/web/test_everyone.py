@@ -13,6 +13,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from gpu import Renderer
+from tests.marks import seldom
 from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.editing import camera
@@ -30,7 +31,7 @@ def findings(editor: Editor) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
+@pytest.mark.parametrize("scheme", seldom(["dark", "light"], ["light"]))
 def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any) -> None:
     editor = Editor(browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme))
     editor.open(server.url)

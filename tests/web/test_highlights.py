@@ -102,6 +102,7 @@ def test_a_click_puts_the_chosen_lamp_where_it_is_mirrored(editor: Editor, serve
     assert document(editor)["shapes"] == BALL["shapes"], "one step of undo"
 
 
+@pytest.mark.slow
 def test_alt_click_turns_the_environment_to_its_highlight(editor: Editor, server: Server) -> None:
     page = editor.page
     sky = {"type": "sky", "sun_elevation": 20, "sun_azimuth": 100, "turbidity": 6}

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
 from tests import gltf_files
 from tests.gltf_lights import BLENDER_LAMP, start_up
 from tests.web.conftest import Editor
 
 
+@pytest.mark.slow
 def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.settled()
     editor.drop("#stage", {"lit.glb": start_up(BLENDER_LAMP).glb()})

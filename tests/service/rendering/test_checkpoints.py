@@ -34,6 +34,7 @@ from service.renderers.local.supervisor import Supervisor
 from service.renders.recorder import Recorder
 from service.renders.store.store import RenderStore
 from service.worker.device import checkpoints
+from tests.marks import seldom
 from tests.supervisors import LINEAR, Ears, arrays_of, settings, with_supervisor
 
 ENDLESS = 1 << 24
@@ -66,7 +67,7 @@ async def picture(supervisor: Supervisor, task: int, ears: Ears) -> np.ndarray:
     return np.array((await ears.next(Image)).pixels)
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("adaptive", seldom([False, True], [True]))
 def test_it_goes_on_to_the_same_bits(gpu: Renderer, adaptive: bool) -> None:
     async def test(supervisor: Supervisor) -> None:
         task, ears = await begun(supervisor, ENDLESS, adaptive=adaptive)

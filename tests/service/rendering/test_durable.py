@@ -136,6 +136,7 @@ def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: b
         assert fourth.stop() == 0
 
 
+@pytest.mark.slow
 def test_renders_with_large_documents_share_little_memory_after_a_restart(gpu: Renderer, tmp_path: Path) -> None:
     """All pictures would fit into the memory, but no document could be read beside them. What they wait for stops
     nobody else."""

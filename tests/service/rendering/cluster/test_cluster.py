@@ -88,6 +88,7 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
     run(test)
 
 
+@pytest.mark.slow
 def test_a_gateway_that_hangs_is_replaced(run: Run, cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     async def test(pool: Pool) -> None:
         assert pool.process_id is not None
