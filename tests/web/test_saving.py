@@ -131,7 +131,8 @@ def test_snapshots_and_names(editor: Editor, server: Server) -> None:
     mine.click()
     editor.wait("red again", lambda: not editor.differs(before, 8))
     editor.page.click("#forget-saved")
-    assert editor.page.is_visible("text=Delete “my red”?"), "it is everybody's, and gone for good"
+    asked = "text=Delete “my red”?"  # it is everybody's, and gone for good
+    editor.wait("a question", lambda: editor.page.is_visible(asked))
     editor.page.keyboard.press("Escape")
     assert mine.count() == 1
     mine.focus()
