@@ -13,7 +13,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import EnvironmentArrays, SceneArrays
-from gpu.device import buffers
+from gpu.device import buffers, lamps
 from gpu.device.textures import IMAGE_UNITS, KINDS, bound_textures, linear_texture, placeholder
 from gpu.device.uploads import Buffer, SharedUploads, Taken, Textures, UploadCache
 from gpu.errors import OutOfMemory
@@ -93,6 +93,7 @@ class Scene:
         self.arrays = arrays
         self._raised = self._flags()
         self._looped = features.looped(arrays)
+        self._lamps = self._brightest()
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
         self._images: Taken[Textures] | None = None
@@ -159,6 +160,9 @@ class Scene:
         if self._editing and self._raised:
             return features.grown(self._raised, self.arrays)
         return features.flags(self.arrays, self._editing)
+
+    def _brightest(self) -> np.ndarray | None:
+        return lamps.brightest(self.arrays) if features.draws_towards_lamps(self._raised) else None
 
     def _upload_environment(self, e: EnvironmentArrays | None) -> _Environment:
         """Raises OutOfMemory."""
@@ -242,6 +246,7 @@ class Scene:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._looped = features.looped(arrays)
         self._raised = self._flags() if flags is None else flags
+        self._lamps = self._brightest()
         self._take_tables()
         self.bytes = unshared_bytes(arrays)
 
@@ -270,6 +275,9 @@ class Scene:
             uniforms[member] = count
         suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
         uniforms["sun_first"], uniforms["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
+        if self._lamps is not None:
+            for member, values in zip(lamps.MEMBERS, self._lamps, strict=True):
+                uniforms[member] = values
         uniforms["moment_scale"] = 1.0 / a.radiance_scale
         if len(suns) or (a.environment and a.environment.sun) or (a.materials["emission"] > 0).any():
             uniforms["glint_chance"] = GLINT_CHANCE

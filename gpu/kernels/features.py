@@ -84,6 +84,17 @@ def needs_tables(raised: Container[str]) -> bool:
     return any(model.flag in raised for model in TABULATED)
 
 
+# Flags of lights that are somewhere.
+NEAR_LIGHTS = frozenset(
+    f"HAS_{kind}_LIGHTS" for kind in ("POINT", "SPOT", "SPHERE", "QUAD", "TRIANGLE", "ELLIPSOID", "CYLINDER")
+)
+
+
+def draws_towards_lamps(raised: frozenset[str]) -> bool:
+    """Whether distances in media are drawn towards lamps."""
+    return raised >= {"HAS_MEDIA", "HAS_SCATTERING"} and not raised.isdisjoint(NEAR_LIGHTS)
+
+
 # Units, to a picture's scale of radiance, in which light is summed that comes to a pixel from elsewhere. 64 bits hold
 # eight million times that radiance.
 SPLAT_UNITS = 2.0**40
@@ -165,6 +176,7 @@ def defines(
     out: dict[str, object] = {name: int(name in raised) for name, flag in FLAGS.items() if not flag.of_settings}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
     out["ANY_MEDIA"] = int(not raised.isdisjoint(("HAS_MEDIA", "HAS_SCATTERING")))
+    out["ANY_EQUIANGULAR"] = int(draws_towards_lamps(raised))
     out["ANY_CHAINS"] = int(not raised.isdisjoint(("HAS_BVH", "HAS_MIRRORS", "HAS_PRIORITIES", "HAS_WALKS")))
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))

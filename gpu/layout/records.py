@@ -310,6 +310,10 @@ class Uniforms(Record):
     """The uniform block of one dispatch."""
 
     camera: Camera
+    lamps_x: vec4  # where lamps are that distances in media are drawn towards
+    lamps_y: vec4
+    lamps_z: vec4
+    lamps_intensity: vec4  # W / sr; 0: there is none
     environment_turn: vec2  # cosine, sine of the rotation
     resolution: uvec2  # of the whole picture
     tile_origin: uvec2

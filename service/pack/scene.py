@@ -132,7 +132,8 @@ def _environment(
         sky.texels, sky.probability, sky.cells, rotation, scale, environment.background,
         sky.cube, sky.sun, sky.sun_share, key="" if key is None else repr(key),
     )  # fmt: skip
-    if scale <= 0:
+    fog = environment.medium
+    if scale <= 0 or (fog is not None and min(fog.coefficients()[0]) > 0):  # nothing comes through all space
         return _Sky(arrays, warnings=warnings)
     return _Sky(arrays, math.pi * radius**2 * sky.irradiance, scale * sky.peak, warnings)
 

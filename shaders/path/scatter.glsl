@@ -2,6 +2,7 @@
 // the phase function of Henyey and Greenstein [1941] takes the place of the BSDF, whose frame has wo as its z.
 
 #include "path/walk.glsl"
+#include "path/equiangular.glsl"
 
 // Whether the ray has come to a boundary that is not there.
 bool path_passes(Path path) {
@@ -25,26 +26,46 @@ bool scatter_was(Path path) {
 const uint SCATTER_ID = NONE - 1u; // in place of the id of a shape
 
 // Samples how far the ray goes before something scatters it: by the extinction of one channel, chosen as the throughput has
-// it, weighted by the balance heuristic over all three. Where it gets through, what is left of `u` decides on what follows.
+// it, or towards a lamp, weighted by the balance heuristic over all. Where it gets through, what is left of `u` decides
+// on what follows.
 void scatter_distance(float u, inout Path path) {
+    const float BELOW_1 = 1.0 - 1.0 / 16777216.0;
+    float aimed = 0.0; // the chance that the distance is drawn towards a lamp
+    bool aims = false;
+#if ANY_EQUIANGULAR
+    Equiangular e = equiangular_make(path.o, path.d, path.hit.t, dot(path.medium.rate, vec3(1.0 / 3.0)));
+#if HAS_WALKS
+    if (path.walks) e.chances = vec4(0.0); // no lamp is sampled there
+#endif
+    aimed = equiangular_chance(e);
+    aims = u < aimed;
+    float t_aimed = equiangular_sample(e, u);
+    if (!aims) u = clamp((u - aimed) / (1.0 - aimed), 0.0, BELOW_1);
+#endif
     vec3 chance = path.throughput / (path.throughput.x + path.throughput.y + path.throughput.z);
     uint channel = u < chance.x ? 0u : u < chance.x + chance.y ? 1u : 2u;
     float before = channel == 0u ? 0.0 : channel == 1u ? chance.x : chance.x + chance.y;
-    u = clamp((u - before) / chance[channel], 0.0, 1.0 - 1.0 / 16777216.0);
     vec3 rate = path.medium.rate;
+    u = clamp((u - before) / chance[channel], 0.0, BELOW_1);
     float t = -log(1.0 - u) / max(rate[channel], 1.0 / INFINITY_T);
-    path.in_medium = t < path.hit.t && max_component(path.medium.scattering) > 0.0;
+#if ANY_EQUIANGULAR
+    if (aims) t = t_aimed;
+#endif
+    path.in_medium = (aims || t < path.hit.t) && max_component(path.medium.scattering) > 0.0;
     t = min(t, path.hit.t);
     vec3 share = exp(-rate * t), weight = share, pdfs = share;
     if (path.in_medium) {
         weight *= path.medium.scattering;
         pdfs *= rate;
     }
-    float pdf = dot(chance, pdfs);
+    float pdf = (1.0 - aimed) * dot(chance, pdfs);
+#if ANY_EQUIANGULAR
+    if (path.in_medium && aimed > 0.0) pdf += equiangular_pdf(e, t);
+#endif
     path.throughput *= pdf > 0.0 ? weight / pdf : vec3(0.0);
     path.hit.t = t;
     float chance_left = exp(-rate[channel] * t); // of coming so far
-    path.distance_u = clamp((u - (1.0 - chance_left)) / max(chance_left, 1e-30), 0.0, 1.0 - 1.0 / 16777216.0);
+    path.distance_u = clamp((u - (1.0 - chance_left)) / max(chance_left, 1e-30), 0.0, BELOW_1);
 }
 #endif
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer
+from gpu import ESTIMATORS, Renderer, layout
 from gpu.layout.bindings import Slot
 from service.scene.half_space import h_function, single_scattering_albedo
 from tests import stats
@@ -56,6 +56,44 @@ def test_turns_follow_the_phase_function(gpu: Renderer, g: float) -> None:
     observed = np.histogram2d(share, around, (bands, angles), [[0, 1], [-np.pi, np.pi]])[0]
     assert stats.chi_square(observed, np.full_like(observed, n / observed.size)) > stats.sidak(1e-3, 6)
     assert turn.mean() == pytest.approx(g, abs=4 * turn.std() / math.sqrt(n))
+
+
+LAMPS = [(0.3, 0, 2, 5), (-0.02, 0.01, 4, 1), (0, -9, 1, 400), (1, 1, -3, 8)]  # the last one is behind the ray
+
+
+@pytest.mark.parametrize("lamps", [LAMPS[:1], LAMPS, [(0.01, 0, 2, 3)], [(0, 0, 2, 3)], []])
+@pytest.mark.parametrize(("t", "rate"), [(6.0, 0.3), (1e30, 0.05), (6.0, 20.0)])
+def test_distances_towards_lamps_follow_their_density(gpu: Renderer, lamps: list[Any], t: float, rate: float) -> None:
+    """Chi-square over distances, of one lamp, of four, and of one close to the ray; none goes beyond the end."""
+    frame = np.zeros((), layout.Uniforms.dtype)
+    for i, values in enumerate(lamps):
+        frame["lamps_x"][i], frame["lamps_y"][i], frame["lamps_z"][i], frame["lamps_intensity"][i] = values
+    n, raised = 100_000, frozenset({"HAS_MEDIA", "HAS_SCATTERING", "HAS_POINT_LIGHTS"})
+
+    def asked(u: Any, at: Any) -> np.ndarray:
+        asks = np.zeros((n, 4), np.float32)
+        asks[:, 0], asks[:, 1] = u, at
+        probe = prober_of(gpu)
+        (out,) = probe.run("equiangular.comp", n, {Slot.SUM: asks}, raised=raised, frame=frame, t=t, rate=rate)
+        return out.astype(float)
+
+    drawn = asked(np.random.default_rng(3).random(n), -1)
+    chance, far = drawn[0, 2], drawn[0, 3]
+    assert far == pytest.approx(min(t, 5 / rate)) and drawn[:, 0].min() >= 0 and drawn[:, 0].max() <= far
+    assert np.isfinite(drawn).all() and 0 <= chance <= 0.5 and (chance > 0 or not lamps or rate > 1)
+    if not lamps or lamps[0][:2] == (0, 0):  # on the ray, where bins would be as narrow as numbers
+        return
+    bins = 1000 if rate < 1 else 100  # far from a lamp few angles are left between numbers
+    edges = np.quantile(drawn[:, 0], np.linspace(0, 1, bins + 1))
+    edges[0], edges[-1] = 0, far
+    middles = (np.arange(n // bins) + 0.5) / (n // bins)
+    density = asked(0, (edges[:-1, None] + np.diff(edges)[:, None] * middles).ravel())[:, 1]
+    shares = density.reshape(bins, -1).mean(axis=1) * np.diff(edges) / chance
+    assert shares.sum() == pytest.approx(1, abs=2e-3)
+    assert np.abs(shares * bins - 1).max() < 0.4  # the edges are those of these draws
+    again = asked(np.random.default_rng(4).random(n), -1)
+    observed = np.histogram(again[:, 0], edges)[0]
+    assert stats.chi_square(observed, n * shares / shares.sum()) > stats.sidak(1e-3, 9)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
