@@ -13,6 +13,7 @@ uniform float old_pixels, new_pixels;
 
 const int STEPS = 8;
 const float FOUND = 0.6; // pixels by which the search may miss
+const float NEAR = 0.05; // pixels at which it has nothing more to gain
 const float ALIKE = 1.1; // the ratio of depths below which neighbours are taken for one surface
 
 // The depth at a place of the old picture: between four pixels of one surface, else that of the nearest.
@@ -46,12 +47,15 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= size.x || pixel.y >= size.y) return;
     vec2 wanted = vec2(pixel) + 0.5, at = wanted, seen;
-    bool there = true;
-    for (int i = 0; i < STEPS && there; i++) {
+    bool there = true, more = true;
+    float off = 0.0;
+    for (int i = 0; i <= STEPS && more; i++) {
         there = prior_moved(at, seen);
-        at += wanted - seen;
+        off = distance(seen, wanted);
+        more = there && off > NEAR && i < STEPS;
+        if (more) at += wanted - seen;
     }
-    there = there && prior_moved(at, seen) && distance(seen, wanted) < FOUND;
+    there = there && off < FOUND;
     there = there && all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(size)));
     warped[pixel.y * size.x + pixel.x] = there ? prior_texel(at) : vec4(0.0, 0.0, 0.0, -1.0);
 }

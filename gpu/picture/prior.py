@@ -27,6 +27,7 @@ REPLACES_FROM, REPLACES_ALL = 0.3, 0.8
 # of 13 pixels.
 NOISE = 1 / 13
 LEAST_KNOWN = 0.5  # of a pixel: less of it says nothing of the change
+SPARSE = 2  # each so-many-th row and column of a picture seen from elsewhere says enough of its averages
 DARK = 1e-3  # of the mean luminance: shares of less light than this mean nothing
 # Vectors of a pixel: before, as another camera sees it, the guess and its weight; and the depth.
 VECTORS = 4.25
@@ -89,7 +90,8 @@ class Prior:
         old, known = self._before, None
         if not self._same(camera):
             old, seen = self._warp(camera)
-            before, known = averages(seen, after.shape[1], after.shape[0])
+            step = SPARSE if 2 * SPARSE * max(after.shape[:2]) <= max(self.size) else 1
+            before, known = averages(seen[::step, ::step], after.shape[1], after.shape[0])
         assert before is not None
         small = {Slot.CHANGE: change(before, after, known), Slot.AFTER: _blurred(after)}
         buffers = {slot: contexts.allocate(self.context, np.ascontiguousarray(v)) for slot, v in small.items()}

@@ -27,7 +27,7 @@ from tests.serving import Client, Picture
 
 STEP_S = 0.2
 STEPS = 5
-REST_S = 3.0  # before a drag
+REST_S = 6.0  # before a drag, so that there is a picture
 SETTINGS = {"width": 768, "height": 432, "max_samples": 1 << 20, "max_bounces": 8}
 REFERENCE_SAMPLES = 48
 # What a drag does to a scene: the change at 0 to 1 of its way.
@@ -102,13 +102,15 @@ def _drag(url: str, document: Any, change: Any, truths: list[np.ndarray], prior:
     client = Client(url)
     try:
         client.start(generation=1, scene=document, settings=SETTINGS, view={"format": "jpeg", "prior": prior})
-        shown = [client.frame(1), *_frames(client, REST_S)][-1]
+        client.frame(1)
+        client.say("update", generation=2, scene=json.loads(json.dumps(change(0.0))))  # its kernels are compiled
+        shown = [client.frame(2), *_frames(client, REST_S)][-1]
         errors, firsts = [], []
         for i, truth in enumerate(truths):
             scene = json.loads(json.dumps(change((i + 1) / STEPS)))
             began = time.monotonic()
-            client.say("update", generation=i + 2, scene=scene)
-            frames = [frame for frame in _frames(client, STEP_S) if frame.generation == i + 2]
+            client.say("update", generation=i + 3, scene=scene)
+            frames = [frame for frame in _frames(client, STEP_S) if frame.generation == i + 3]
             moments = [began, *(frame.at for frame in frames), began + STEP_S]
             seen = [_pixels(each.image) for each in (shown, *frames)]
             spans = np.diff(moments)
