@@ -16,6 +16,7 @@ PORT ?= 8000
 MAIN = 'not browser and not calm and not bench and not slow'
 BROWSER = 'browser and not slow'
 TWO = -n 2 --dist loadfile --no-loadscope-reorder
+AGAIN = --last-failed --last-failed-no-failures none
 export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -30,9 +31,9 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest $(TWO) -m $(MAIN) --durations 20 || .venv/bin/pytest -m $(MAIN) --last-failed
-	.venv/bin/pytest $(TWO) -m $(BROWSER) || .venv/bin/pytest -m $(BROWSER) --last-failed
-	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed
+	.venv/bin/pytest $(TWO) -m $(MAIN) --durations 20 || .venv/bin/pytest -m $(MAIN) $(AGAIN)
+	.venv/bin/pytest $(TWO) -m $(BROWSER) || .venv/bin/pytest -m $(BROWSER) $(AGAIN)
+	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm $(AGAIN)
 
 long-test:
 	@.ci/setup test

@@ -19,27 +19,40 @@ def brightest(arrays: SceneArrays) -> np.ndarray:
     kinds = lights["kind"]
     points = (kinds == LightKind.POINT) | (kinds == LightKind.SPOT)
     place[points], intensity[points] = lights["position"][points], lights["intensity"][points] @ LUMINANCE
-    for kind, middles, areas in _shapes(arrays):
-        mine = kinds == kind
-        radiance = arrays.materials["emission"][lights["material"][mine]] @ LUMINANCE
-        place[mine], intensity[mine] = middles[lights["index"][mine]], areas[lights["index"][mine]] * radiance
+    for kind, records, described in (
+        (LightKind.SPHERE, arrays.spheres, _balls),
+        (LightKind.QUAD, arrays.quads, _quads),
+        (LightKind.TRIANGLE, arrays.triangles, _triangles),
+        (LightKind.ELLIPSOID, arrays.ellipsoids, _solids),
+        (LightKind.CYLINDER, arrays.boxes, _solids),
+    ):
+        mine = np.flatnonzero(kinds == kind)  # of all triangles of a scene few may shine
+        if len(mine):
+            place[mine], areas = described(records[lights["index"][mine]])
+            intensity[mine] = areas * (arrays.materials["emission"][lights["material"][mine]] @ LUMINANCE)
     first = np.argsort(-intensity, kind="stable")[:MOST]
     out = np.zeros((4, MOST), np.float32)
     out[:3, : len(first)], out[3, : len(first)] = place[first].T, intensity[first]
     return out
 
 
-def _shapes(arrays: SceneArrays) -> list[tuple[LightKind, np.ndarray, np.ndarray]]:
-    """The middles (n, 3) and the areas (n,), as they are seen, of the shapes of each kind of light."""
-    balls, quads, corners = arrays.spheres, arrays.quads, arrays.triangles
-    a, b, c = (corners[name].astype(float) for name in ("v0", "v1", "v2"))
-    out = [
-        (LightKind.SPHERE, balls["center"], np.pi * balls["radius"].astype(float) ** 2),
-        (LightKind.QUAD, quads["origin"] + 0.5 * (quads["u"] + quads["v"]), quads["area"]),
-        (LightKind.TRIANGLE, (a + b + c) / 3, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)),
-    ]
-    for kind, solids in ((LightKind.ELLIPSOID, arrays.ellipsoids), (LightKind.CYLINDER, arrays.boxes)):
-        rows = np.stack([solids[f"row_{axis}"] for axis in "xyz"], axis=1).astype(float)
-        shrinks = np.abs(np.linalg.det(rows)) if len(rows) else np.zeros(0)  # of volumes, to a unit ball or cube
-        out.append((kind, solids["center"], np.pi * np.maximum(shrinks, 1e-30) ** (-2 / 3)))
-    return out
+# Of shapes: their middles (n, 3), and their areas (n,) as they are seen.
+
+
+def _balls(balls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return balls["center"], np.pi * balls["radius"].astype(float) ** 2
+
+
+def _quads(quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return quads["origin"] + 0.5 * (quads["u"] + quads["v"]), quads["area"]
+
+
+def _triangles(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a, b, c = (triangles[name].astype(float) for name in ("v0", "v1", "v2"))
+    return (a + b + c) / 3, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def _solids(solids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As balls of the same volume."""
+    rows = np.stack([solids[f"row_{axis}"] for axis in "xyz"], axis=1).astype(float)  # object from world
+    return solids["center"], np.pi * np.maximum(np.abs(np.linalg.det(rows)), 1e-30) ** (-2 / 3)

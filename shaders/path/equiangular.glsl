@@ -5,6 +5,7 @@
 #if ANY_EQUIANGULAR
 const float EQUIANGULAR_MOST = 0.5;  // of the chance that the distance is drawn so
 const float EQUIANGULAR_DEPTH = 5.0; // mean free paths beyond which none is
+const float EQUIANGULAR_LEAST = 1e-3; // of the angle for a lamp to be drawn towards: few numbers lie within less
 
 // A lamp in each component.
 struct Equiangular {
@@ -28,8 +29,9 @@ Equiangular equiangular_make(vec3 o, vec3 d, float t, float rate) {
     vec4 nearest = 1e-4 * sqrt(x * x + y * y + z * z) + 1e-10; // of a lamp that the ray hits: any density may be drawn from
     e.apart = max(sqrt(across_x * across_x + across_y * across_y + across_z * across_z), nearest);
     e.begin = atan(-e.along, e.apart);
-    e.span = max(atan(e.far - e.along, e.apart) - e.begin, 1e-7);
-    vec4 sent = uniforms.lamps_intensity * e.span / e.apart;
+    vec4 span = atan(e.far - e.along, e.apart) - e.begin;
+    e.span = max(span, EQUIANGULAR_LEAST);
+    vec4 sent = step(EQUIANGULAR_LEAST, span) * uniforms.lamps_intensity * span / e.apart;
     float all = sent.x + sent.y + sent.z + sent.w;
     float most = EQUIANGULAR_MOST * (1.0 - exp(-rate * e.far));
     e.chances = all > 0.0 && all < INFINITY_T ? most * min(e.span, 1.0) * sent / all : vec4(0.0);

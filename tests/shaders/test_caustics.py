@@ -198,7 +198,7 @@ AGREE: dict[str, dict[str, Any]] = {
     "under water": {"lamps": [WATER, HELD, BALL_LAMP], "camera": PERSPECTIVE | {"position": [-2, 1.0, 3]}},
     "a box": {"lamps": [{"type": "box", "min": [-2, 3, 0], "max": [-1.6, 3.4, 0.6], "material": "lamp"}]},
     "dispersion": {"ball": GLASS | {"abbe": 15}},
-    "a receiver that shines": {"floor": {"type": "principled", "base_color": 0.4, "roughness": 0.3}},
+    "a glossy receiver": {"floor": {"type": "principled", "base_color": 0.4, "roughness": 0.3}},
     "a mesh that is turned": {"body": GEM},
     "fog": {"lamps": [BALL_LAMP], "environment": {"type": "constant", "radiance": 0, "medium": HAZE}},
 }

@@ -81,7 +81,7 @@ def test_distances_towards_lamps_follow_their_density(gpu: Renderer, lamps: list
     chance, far = drawn[0, 2], drawn[0, 3]
     assert far == pytest.approx(min(t, 5 / rate)) and drawn[:, 0].min() >= 0 and drawn[:, 0].max() <= far
     assert np.isfinite(drawn).all() and 0 <= chance <= 0.5 and (chance > 0 or not lamps or rate > 1)
-    if not lamps or lamps[0][:2] == (0, 0):  # on the ray, where bins would be as narrow as numbers
+    if chance == 0 or lamps[0][:2] == (0, 0):  # on the ray, where bins would be as narrow as numbers
         return
     bins = 1000 if rate < 1 else 100  # far from a lamp few angles are left between numbers
     edges = np.quantile(drawn[:, 0], np.linspace(0, 1, bins + 1))
