@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.stats import qmc
 
 # Wavelengths in nm, the CIE 1931 observer's x, y and z, and illuminant D65 [CIE 018:2019; ISO/CIE 11664-2:2022].
 TABLE = np.loadtxt(Path(__file__).with_name("cie_1931_d65.csv"), delimiter=",")
@@ -51,3 +52,9 @@ def metal_index(f0: np.ndarray, edge: np.ndarray) -> np.ndarray:
     root = np.sqrt(f0)
     n = edge * (1 - f0) / (1 + f0) + (1 - edge) * (1 + root) / (1 - root)
     return np.asarray(n + 1j * np.sqrt(np.maximum(0, ((n + 1) ** 2 * f0 - (n - 1) ** 2) / (1 - f0))))
+
+
+def draw(records: np.ndarray) -> None:
+    """Put films on materials: low-discrepancy draws of weight, thickness up to a micrometre and index up to 3."""
+    u = qmc.Sobol(3, seed=5).random(len(records))
+    records["film_weight"], records["film_thickness"], records["film_ior"] = u[:, 0], 1000 * u[:, 1], 1 + 2 * u[:, 2]

@@ -50,6 +50,7 @@ struct Surface {
     float film_ior;
     float film_outer;      // index of what lies on the film, where a vacuum's is 1,
     float film_base;       // and of what lies under it
+    float film_bends;      // the index of the inside relative to that of the outside by which light is refracted
     vec3 film_eta;         // of the metal under it,
     vec3 film_k;           // whose index is film_eta + i film_k
     vec3 film_mean;        // cosine-weighted mean of the dielectric's reflectance, from outside,

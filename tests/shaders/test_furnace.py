@@ -13,8 +13,9 @@ from gpu import ESTIMATORS, Renderer
 from gpu.layout import ABSENT
 from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
+from tests import film
 from tests.extremes.scenes import LONG
-from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
+from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of, rare
 from tests.rendering import document, picture, render
 
 WHITE = {"type": "constant", "radiance": 1}
@@ -54,7 +55,7 @@ def _materials(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _albedo(prober: Prober, m: np.ndarray, asks: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray]:
     """Directional albedo of the brightest channel and its standard error, none of it NaN or negative."""
     inputs = {Slot.SUM: asks, Slot.MATERIALS: m}
-    told = prober.run("albedo.comp", len(m), inputs, (Slot.OUTPUT,), {}, PRINCIPLED_FLAGS, samples=samples)
+    told = prober.run("albedo.comp", len(m), inputs, (Slot.OUTPUT,), {}, PRINCIPLED_FLAGS | rare(m), samples=samples)
     out = told[0].astype(float)
     assert (out[:, 2] == 1).all()
     return out[:, 0], np.sqrt(np.maximum(out[:, 1] - out[:, 0] ** 2, 0) / samples)
@@ -83,6 +84,19 @@ def test_no_parameters_gain_light(prober: Prober, kind: str) -> None:
     again, error = _albedo(prober, m[first], asks[first], 1 << 15)
     top = int(np.argmax(again - 4 * error))
     assert again[top] - 4 * error[top] < 1.003, (again[top], error[top], m[first][top], asks[first][top])
+
+
+def test_films_on_white_gain_little(prober: Prober) -> None:
+    """All parameters are drawn. Means over rough facets know four cosines: a few of 4 096 draws gain more."""
+    m, asks = _materials(_draws("white"))
+    film.draw(m)
+    albedo, _ = _albedo(prober, m, asks, 256)
+    first = np.argsort(-albedo)[:96]  # the brightest again, with more samples
+    again, error = _albedo(prober, m[first], asks[first], 1 << 14)
+    least = again - 4 * error
+    top = int(np.argmax(least))
+    assert least[top] < 1.06, (again[top], error[top], m[first][top], asks[first][top])
+    assert (least > 1.003).sum() <= 4
 
 
 GRAZING = math.cos(math.radians(87))

@@ -87,8 +87,10 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
 #if HAS_CLEARCOAT
         s.film_outer = mix(1.0, max(m.coat_ior, 1.0), m.clearcoat * (1.0 - s.transmission));
 #endif
-        bool below = s.turned_out || m.ior < s.film_outer;
-        s.film_base = s.film_outer * (below ? 1.0 / s.eta_outside : s.eta_outside);
+        s.film_bends = s.turned_out ? 1.0 / s.eta_outside : s.eta_outside;
+        // A coat that is denser than the base does not reflect all of slanting light: its index has been turned over.
+        s.film_base = s.film_outer * s.film_bends;
+        if (!s.turned_out && m.ior < s.film_outer) s.film_base = max(1.0, s.film_outer / s.eta_outside);
         film_metal_index(s.specular_weight * s.base_color, s.specular_color, s.film_outer, s);
     }
 #endif

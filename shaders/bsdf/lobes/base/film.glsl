@@ -9,6 +9,7 @@
 const float FILM_LEAST = 0.03; // um: below it the film fades into the bare boundary, whose metal may have another curve
 // exp(p x) has vanished at this path difference, um; the sine of a much greater one is not known in single precision.
 const float FILM_LONGEST = 60.0;
+const float FILM_TOTAL = 1e30;
 const int FILM_WAVES = 4;
 const vec3 FILM_DECAY[FILM_WAVES] = vec3[]( // -Re p, 1/um
     vec3(0.94786, 0.84141, 2.31745),
@@ -37,7 +38,7 @@ void film_surface(Material m, inout Surface s) {
     s.film = m.film_weight * min(s.film_thickness / FILM_LEAST, 1.0);
     s.film_ior = max(m.film_ior, 1.0);
     s.film_outer = 1.0;
-    s.film_base = s.eta_outside;
+    s.film_base = s.film_bends = s.eta_outside;
     s.film_eta = s.film_k = s.film_mean = s.film_metal_mean = s.film_once = s.film_kept = s.film_kept_mean = vec3(0.0);
     s.film_lost = s.film_lost_outside = s.film_lost_inside = vec3(0.0);
     s.film_cosine = 1.0;
@@ -64,10 +65,13 @@ vec3 film_term(vec3 x, vec3 y, int wave) {
 float film_passed(float a, float b) { return a * b / (a + b - a * b); }
 vec3 film_passed(float a, vec3 b) { return a * b / (a + b - a * b); }
 
-// The square of the sine of the angle in a vacuum of light at cosine c; eta is as base_dielectric takes it.
+// The square of the sine of the angle in a vacuum of light at cosine c, more than any index where all is reflected; eta is
+// as base_dielectric takes it. By it light is refracted, under a coat too: both sides see the same reflectance.
 float film_sine2(Surface s, float c, float eta) {
-    bool outside = (eta >= 1.0) == (s.film_base >= 1.0);
-    return (outside ? 1.0 : sqr(s.film_base)) * (1.0 - c * c);
+    float sine2 = 1.0 - c * c;
+    if (sine2 >= eta * eta) return FILM_TOTAL;
+    bool outside = (eta >= 1.0) == (s.film_bends >= 1.0);
+    return (outside ? 1.0 : sqr(s.film_bends)) * sine2;
 }
 
 // The film's reflectance on the dielectric, for light of that angle: the same from both sides.

@@ -35,10 +35,22 @@ SharesMean shares_mean(Surface s, vec4 cosines, vec4 weights, float eta, bool ne
     return r;
 }
 
-// Over the facets that light of cosine c meets, by a rule.
-SharesMean shares_mean(Surface s, float c, float eta, float rule, bool needed) {
-    float roughness = s.is_delta ? 0.0 : s.roughness;
-    return shares_mean(s, energy_facets(c, roughness, rule), energy_facets(c, roughness, rule + 1.0), eta, needed);
+// The roughness of the round lobe whose facets lie to w as those of this one do: slanting light sees their slopes along its
+// azimuth, light from above those along both axes.
+float shares_roughness(Surface s, vec3 w) {
+#if HAS_ANISOTROPIC
+    if (!s.is_delta && s.aspect < 1.0) {
+        vec3 turned = bsdf_turn(s, w);
+        return sqrt(sqrt(dot(turned * turned, vec3(s.alpha * s.alpha, s.alpha.x * s.alpha.y))));
+    }
+#endif
+    return s.is_delta ? 0.0 : s.roughness;
+}
+
+// Over the facets that light from w meets, by a rule.
+SharesMean shares_mean(Surface s, vec3 w, float eta, float rule, bool needed) {
+    float roughness = shares_roughness(s, w);
+    return shares_mean(s, energy_facets(w.z, roughness, rule), energy_facets(w.z, roughness, rule + 1.0), eta, needed);
 }
 
 float shares_eta(Surface s, bool inside) { return inside ? 1.0 / s.eta_outside : s.eta_outside; }
@@ -65,14 +77,14 @@ vec3 shares_loss(Surface s, vec4 albedo, bool inside, SharesMean some, SharesMea
 // Sets what depends on wo, of a surface with a film. All means are taken in one loop: drivers inline each call, and the
 // film is most of such a kernel.
 void shares_face_film(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
-    float roughness = s.is_delta ? 0.0 : s.roughness;
+    float of_wo = shares_roughness(s, wo), of_all = s.is_delta ? 0.0 : s.roughness;
     SharesMean once, own, own_met, outside, outside_met, inside, fresnel;
     vec3 ripples = vec3(0.0);
     for (int k = 0; k < 7 + SHARES_RIPPLES / 4; k++) {
         bool behind = k == 5 || (s.inside && (k == 1 || k == 2)), needed = HAS_TRANSMISSION != 0 || k == 0 || k == 3 || k > 5;
         float rule = (k < 3 ? FACETS_OF_ONE : FACETS_OF_ALL) + (k == 2 || k == 4 ? FACETS_MET : 0.0);
-        vec4 cosines = energy_facets(k < 3 ? wo.z : 0.0, roughness, rule);
-        vec4 weights = energy_facets(k < 3 ? wo.z : 0.0, roughness, rule + 1.0);
+        float c = k < 3 ? wo.z : 0.0, roughness = k < 3 ? of_wo : of_all;
+        vec4 cosines = energy_facets(c, roughness, rule), weights = energy_facets(c, roughness, rule + 1.0);
         if (k == 6) {
             cosines = FRESNEL_COSINES;
             weights = FRESNEL_WEIGHTS;
@@ -112,7 +124,7 @@ void shares_face_film(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
 BASE_SHARE shares_once(Surface s, vec3 w, vec4 albedo) {
 #if HAS_FILM
     if (s.film > 0.0) {
-        vec3 gain = shares_mean(s, w.z, s.eta_outside, FACETS_OF_ONE, true).gain;
+        vec3 gain = shares_mean(s, w, s.eta_outside, FACETS_OF_ONE, true).gain;
         return clamp(albedo.y + albedo.x * gain, 0.0, albedo.x);
     }
 #endif
@@ -158,7 +170,7 @@ BASE_SHARE shares_lost(Surface s, vec3 w, vec4 albedo, bool inside) {
         SharesMean some, all;
         for (int k = 0; k < 2; k++) {
             float rule = k == 0 ? FACETS_OF_ONE : FACETS_OF_ONE + FACETS_MET;
-            SharesMean mean = shares_mean(s, w.z, shares_eta(s, inside), rule, k == 0 || !inside);
+            SharesMean mean = shares_mean(s, w, shares_eta(s, inside), rule, k == 0 || !inside);
             if (k == 0) some = mean;
             else all = mean;
         }
