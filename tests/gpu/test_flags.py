@@ -18,6 +18,7 @@ from service.pack import Packed, pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG, ball, icosphere
 from tests.gpu.flag_scenes import FLOOR, IMAGES, LAMP, SCENES, Doc, T, lit, made_of
+from tests.marks import seldom
 from tests.rendering import document
 
 ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS", "INSTANCES"}  # raised in the tests of glTF files, textured lights, instances
@@ -80,7 +81,7 @@ CLEAR = {"type": "principled", "transmission": 1, "roughness": 0}
 CHECKS = {"type": "checker", "a": 0.1, "b": 0.9}
 
 
-@pytest.mark.parametrize("estimator", ["mis", "light"])
+@pytest.mark.parametrize("estimator", seldom(["mis", "light"], ["light"]))
 @pytest.mark.parametrize(
     "more", [{}, {"attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}, {"alpha": 0.5}, {"base_color": T}]
 )

@@ -47,6 +47,7 @@ def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arra
     with_supervisor(test)
 
 
+@pytest.mark.slow
 def test_a_lamp_is_seen_before_its_kernel_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:
     """Any number of shapes may begin to shine, so that the kernel for it is not foreseen; the superset kernel is."""
     lamp = {name: {**material, "emission": 2.0} for name, material in SCENE["materials"].items()}

@@ -18,6 +18,7 @@ from gpu import Renderer
 from service.cli import main
 from service.views import BSDF_KINDS
 from tests import baseline
+from tests.marks import seldom
 from tests.probing import materials
 
 GREY = {"type": "diffuse", "albedo": 0.5}
@@ -126,7 +127,7 @@ def test_slice(write: Any, tmp_path: Path) -> None:
     assert found.keys() == {"theta_deg", *(f"theta_d_{d}" for d in range(90))}
 
 
-@pytest.mark.parametrize("kind", BSDF_KINDS)
+@pytest.mark.parametrize("kind", seldom(BSDF_KINDS, BSDF_KINDS[1::2]))
 def test_figures(write: Any, tmp_path: Path, kind: str) -> None:
     out = [tmp_path / name for name in ("a.svg", "b.svg", "c.png")]
     for path in out:

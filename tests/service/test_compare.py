@@ -120,6 +120,7 @@ def test_a_mean_shift_is_not_taken_for_noise(http: httpx.Client, factor: float) 
     assert found["different"] and np.sign(found["mean_difference"]) == np.sign(factor - 1)
 
 
+@pytest.mark.slow
 def test_other_ways_to_the_same_light_do_not_differ(http: httpx.Client) -> None:
     scene = changed("/lights", [])
     scene["shapes"].append(

@@ -31,7 +31,7 @@ from tests.serving import Server, client
 
 DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 80))
 FILES = int(os.environ.get("HOSTILE_FILES", 30))
-EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 8))
+EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 4))
 SEED = int(os.environ.get("HOSTILE_SEED", 1))
 CHECKS = [
     schemathesis.checks.not_a_server_error,

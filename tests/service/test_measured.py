@@ -101,6 +101,7 @@ def test_a_render_tells_of_a_file_that_gains_light(server: Server, bright: str) 
     assert albedo[12, 16] == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_stream_shows_what_a_new_one_shows(server: Server, rough: str, bright: str) -> None:
     def shown(material: dict[str, Any]) -> np.ndarray:
         with client(server) as stream:

@@ -24,6 +24,7 @@ from service.scene import check_saved_material, parse_scene
 from service.scene.material.disney import DisneyMaterial
 from service.scene.material.surface import Surface
 from tests.counting import python_lines
+from tests.marks import seldom
 
 EVERY = [(kind, entry["name"]) for kind in presets.KINDS for entry in presets.names(kind)]
 SCENES = [name for kind, name in EVERY if kind == "scenes"]
@@ -276,7 +277,7 @@ def rendered(gpu: Renderer, store: AssetStore, document: dict[str, Any]) -> np.n
         scene.release()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", seldom(SCENES, SCENES[1::2]))
 def test_every_scene_renders(gpu: Renderer, store: AssetStore, name: str) -> None:
     """And is neither black nor white at exposure 0, where nobody has touched it."""
     color = rendered(gpu, store, presets.get("scenes", name))[..., :3]

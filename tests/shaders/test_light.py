@@ -16,6 +16,7 @@ from service.pack import pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG
 from tests.gpu import flag_scenes
+from tests.marks import seldom
 from tests.rendering import Images, assert_estimators_agree, document, picture, render
 
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
@@ -105,7 +106,7 @@ MESH = {"type": "mesh", "vertices": VERTICES, "faces": [[0, 1, 2], [0, 2, 3]], "
 BOX = {"type": "box", "min": [0, 0, 1.1], "max": [0.9, 0.7, 1.2], "material": "lamp"}
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
 @pytest.mark.parametrize("lamp", [RECTANGLE, MESH, BOX], ids=["quad", "mesh", "box"])
 def test_rectangular_lights(gpu: Renderer, lamp: dict[str, Any], estimator: str) -> None:
     camera = {"position": [-1, -1, 1], "target": [0, 0, 0], "vfov": 0.02}

@@ -13,6 +13,7 @@ from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
+from tests.marks import seldom
 from tests.probing import prober_of
 from tests.rendering import Images, assert_estimators_agree, document, render
 
@@ -201,7 +202,7 @@ TURNED_MESH = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
 @pytest.mark.parametrize("shape", [_quad(1.1, 0.9, 0.7, False), _quad(1.1, 0.9, 0.7), TURNED_MESH],
                          ids=["behind", "front", "mesh"])  # fmt: skip
 def test_both_sides_shine(gpu: Renderer, shape: dict[str, Any], estimator: str) -> None:

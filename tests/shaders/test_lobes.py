@@ -12,6 +12,7 @@ from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from tests import baseline, disney, stats
 from tests.lobes import BLINN_PHONG, LAYERED, METAL_ROUGH, PHONG, ROWS, D, Grid
+from tests.marks import seldom
 from tests.probing import DISNEY_FLAGS, OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of, rare
 
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] not in (BLINN_PHONG, PHONG)]
@@ -159,7 +160,7 @@ def test_layered_models_are_reciprocal(prober: Prober, row: str, inside: int) ->
 
 
 @pytest.mark.parametrize("row", LAYERED)
-@pytest.mark.parametrize("angle", [pytest.param(30.0, marks=pytest.mark.slow), 50.0, 70.0])
+@pytest.mark.parametrize("angle", seldom([30.0, 50.0, 70.0], [30.0, 50.0]))
 def test_layered_samples_follow_their_pdf(prober: Prober, row: str, angle: float) -> None:
     """Over the whole sphere in cells of cosine and azimuth, from outside and from inside."""
     rng = np.random.default_rng(4)

@@ -10,6 +10,7 @@ import pytest
 
 from gpu import ESTIMATORS, Renderer
 from tests.extremes.scenes import ball, icosphere, quad
+from tests.marks import seldom
 from tests.rendering import document, render
 
 Doc = dict[str, Any]
@@ -48,7 +49,7 @@ BODIES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", seldom(BODIES, ["box", "ellipsoid"]))
 @pytest.mark.parametrize("bounces", [0, 8])
 def test_a_lamp_within_the_body_that_the_camera_is_in(gpu: Renderer, body: str, bounces: int) -> None:
     lamp = quad("lamp", (-1, -1, -0.5), (2, 0, 0), (0, 2, 0))

@@ -78,7 +78,11 @@ def test_hidden_shapes_are_seen_in_reflections_and_light_the_room(gpu: Renderer)
 @pytest.mark.parametrize(
     ("kind", "estimator", "many"),
     [
-        *((kind, name, False) for kind in SHAPES for name in ESTIMATORS),
+        *(
+            pytest.param(kind, name, False, marks=[pytest.mark.slow] * (kind in SELDOM and name in ("bsdf", "light")))
+            for kind in SHAPES
+            for name in ESTIMATORS
+        ),
         *(pytest.param(kind, "mis", True, marks=[pytest.mark.slow] * (kind in SELDOM)) for kind in SHAPES),
     ],
 )

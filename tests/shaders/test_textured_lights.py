@@ -59,7 +59,7 @@ def test_the_light_on_a_floor_is_the_sum_over_the_lamp(gpu: Renderer, shape: str
 
 CUT = {"emission_sides": "both", "alpha": {"texture": "s", "channel": "r"}}
 PAIRS = [
-    *(pytest.param(shape, {}, marks=[pytest.mark.slow] * (shape == "ellipsoid")) for shape in SHAPES),
+    *(pytest.param(shape, {}, marks=[pytest.mark.slow] * (shape in ("ellipsoid", "sphere"))) for shape in SHAPES),
     ("sphere", CUT),
     *(pytest.param(shape, CUT, marks=pytest.mark.slow) for shape in ("quad", "ellipsoid")),
 ]

@@ -14,6 +14,7 @@ from service.assets import AssetStore, integrity
 from service.problems import AssetError, NotFound
 from tests import asset_files as make
 from tests.asset_files import OBJ
+from tests.marks import seldom
 
 PNG = make.png(np.arange(48, dtype=np.uint8).reshape(4, 4, 3))
 GLB = make.glb(make.gltf())
@@ -47,7 +48,7 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in (folder / "assets").iterdir()}
 
 
-@pytest.mark.parametrize("data", [OBJ, PNG, GLB])
+@pytest.mark.parametrize("data", seldom([OBJ, PNG, GLB], [PNG]))
 @pytest.mark.parametrize("suffix", ["", ".json"])
 def test_sending_it_again_heals(
     data: bytes, suffix: str, store: AssetStore, restarted: AssetStore, tmp_path: Path
@@ -121,7 +122,7 @@ def test_what_cannot_be_read_is_damaged(
         restarted.read(id)
 
 
-@pytest.mark.parametrize("how", ["import", "scene", "scene without its document"])
+@pytest.mark.parametrize("how", seldom(["import", "scene", "scene without its document"], ["scene"]))
 def test_importing_a_scene_again_heals_its_parts(
     how: str, store: AssetStore, restarted: AssetStore, tmp_path: Path
 ) -> None:

@@ -116,6 +116,7 @@ def test_switching_it_starts_nothing_again(client: Client, raw: Any) -> None:
     assert np.array_equal(client.finished()[1].array(), before.array())
 
 
+@pytest.mark.slow
 def test_a_long_stream_shows_denoised_frames_that_rise(client: Client) -> None:
     client.start(settings=ENDLESS, view=RAW)
     frames = [client.frame()]

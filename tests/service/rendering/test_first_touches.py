@@ -18,6 +18,7 @@ from service.streams import protocol
 from service.streams.edit_session import EditSession
 from service.worker.device.loaded_scene import EditedScene, KernelRequest, Offloaded, edited_scene, kernel_request
 from tests.bench.sliders import Slider, sliders
+from tests.marks import seldom
 
 SETTINGS = {"width": 256, "height": 256}
 SHARES = (0.0, 0.618, 1.0)  # of a slider's range: it is dragged to its ends, too
@@ -98,7 +99,10 @@ def test_a_rare_slider_is_foreseen_as_the_first(name: str, more: dict[str, Any])
     assert asked and all(request.key in keys for request in asked)
 
 
-@pytest.mark.parametrize("name", [entry["name"] for entry in presets.names("scenes")])
+NAMES = [entry["name"] for entry in presets.names("scenes")]
+
+
+@pytest.mark.parametrize("name", seldom(NAMES, NAMES[1::2]))
 def test_every_slider_is_foreseen(name: str) -> None:
     document = presets.get("scenes", name)
     first = Shown(document)

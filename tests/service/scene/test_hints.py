@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from service.scene import schema
+from tests.marks import seldom
 from tests.serving import SCENE, SMALL, Server
 
 
-@pytest.mark.parametrize("field", ["ior", "clearcoat_roughness"])
+@pytest.mark.parametrize("field", seldom(["ior", "clearcoat_roughness"], ["clearcoat_roughness"]))
 def test_a_field_that_follows_another_says_what_it_comes_to(server: Server, field: str) -> None:
     """Rendered with the value that the hint has and without one, the picture is the same."""
     follows = schema()["scene"]["$defs"]["PrincipledMaterial"]["properties"][field]["x-follows"]
