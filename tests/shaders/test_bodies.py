@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer
+from gpu import Renderer
 from tests.extremes.scenes import ball, quad
+from tests.marks import BY_ESTIMATOR
 from tests.rendering import assert_estimators_agree, document, render
 
 Doc = dict[str, Any]
@@ -101,7 +102,7 @@ def test_water_in_a_glass_that_overlaps_is_as_water_that_touches(gpu: Renderer) 
     np.testing.assert_allclose(seen(gpu, shapes, 6, max_bounces=4), passed, rtol=0.01)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_cavity_of_index_1(gpu: Renderer, estimator: str) -> None:
     shapes = [slab("glass", -3, 3), slab("air", -1, 1, priority=1), lamp(-6)]
     passed = (1 - reflected(1, GLASS)) ** 4

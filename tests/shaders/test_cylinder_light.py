@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer
+from gpu import Renderer
 from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
-from tests.marks import seldom
+from tests.marks import BY_ESTIMATOR, seldom
 from tests.probing import prober_of
 from tests.rays import to_world
 from tests.rendering import Images, document, render
@@ -159,7 +159,7 @@ STANDING = tube([0.5, 0.2, 0.1], [0, 0, 1.3], 0.15)
 LYING = tube([-0.4, 0.1, 0.6], [1.1, 0.3, 0.2], 0.2)
 
 
-@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("both", [False, True])
 def test_short_tubes_by_every_estimator(gpu: Renderer, estimator: str, both: bool) -> None:
     """One stands on the floor, so that its axis lies in the element's normal, and one lies above it."""
@@ -175,7 +175,7 @@ def test_short_tubes_by_every_estimator(gpu: Renderer, estimator: str, both: boo
             np.testing.assert_allclose(image, expected * COLOR, rtol=0.04)
 
 
-@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_closed_cylinder_shines_by_its_caps_too(gpu: Renderer, estimator: str) -> None:
     """E = pi L r^2 / (r^2 + d^2) under the middle of a cap, which hides the side; its inside is dark."""
     shape = {**tube([0, 0, 0.7], [0, 0, 2], 0.3), "caps": True}
@@ -187,7 +187,7 @@ def test_a_closed_cylinder_shines_by_its_caps_too(gpu: Renderer, estimator: str)
 
 
 @pytest.mark.parametrize("transform", [{}, {"scale": [1, 1.5, 0.8], "rotate": [10, 20, 30]}])
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_closed_cylinder_holds_its_light(gpu: Renderer, estimator: str, transform: dict[str, Any]) -> None:
     """Inside one of emission L on both sides and albedo a there is L (1 - a^(n+1)) / (1 - a) after n bounces."""
     glow = {"type": "diffuse", "albedo": 0.6, "emission": COLOR.tolist(), "emission_sides": "both"}

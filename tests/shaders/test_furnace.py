@@ -15,7 +15,7 @@ from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from tests import film
 from tests.extremes.scenes import LONG
-from tests.marks import seldom
+from tests.marks import BY_ESTIMATOR, seldom
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of, rare
 from tests.rendering import document, picture, render
 
@@ -199,7 +199,7 @@ def test_weights_do_not_pile_up_inside_rough_glass(gpu: Renderer, shape: dict[st
     assert found.max() < 100
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("material", [GLASS, {**METAL, "roughness": 0}, {**GLASS, "ior": 1, "roughness": 0.5}])
 def test_perfectly_specular_lobes_in_every_estimator(gpu: Renderer, estimator: str, material: dict[str, Any]) -> None:
     """What a mirror or clear glass shows is counted in full, whatever the estimator does elsewhere."""

@@ -16,7 +16,7 @@ from service.pack import pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG
 from tests.gpu import flag_scenes
-from tests.marks import seldom
+from tests.marks import BY_ESTIMATOR
 from tests.rendering import Images, assert_estimators_agree, document, picture, render
 
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
@@ -47,7 +47,7 @@ def test_a_light_behind_gives_nothing(gpu: Renderer) -> None:
     assert render(gpu, document([QUAD], lights=[light]), 4)[..., :3].max() == 0
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("filter_name", FILTERS)
 def test_convex_furnace(gpu: Renderer, estimator: str, filter_name: str) -> None:
     env = {"type": "constant", "radiance": [2, 1, 0.5]}
@@ -83,7 +83,7 @@ def test_closed_room_holds_its_geometric_series(
     assert image.min() > 2
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_sphere_light(gpu: Renderer, estimator: str) -> None:
     """E = pi L (r / d)^2 cos for a sphere wholly above the horizon [Hottel]."""
     r, d, tilt = 0.3, 1.2, math.radians(40)
@@ -106,7 +106,7 @@ MESH = {"type": "mesh", "vertices": VERTICES, "faces": [[0, 1, 2], [0, 2, 3]], "
 BOX = {"type": "box", "min": [0, 0, 1.1], "max": [0.9, 0.7, 1.2], "material": "lamp"}
 
 
-@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("lamp", [RECTANGLE, MESH, BOX], ids=["quad", "mesh", "box"])
 def test_rectangular_lights(gpu: Renderer, lamp: dict[str, Any], estimator: str) -> None:
     camera = {"position": [-1, -1, 1], "target": [0, 0, 0], "vfov": 0.02}
@@ -287,7 +287,7 @@ def test_guides_of_the_first_hit(gpu: Renderer) -> None:
     assert made.read()[0, 0, 3] == 0
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("bounces", [0, 1, 5])
 def test_ambient_is_added_where_a_path_meets_the_surface(gpu: Renderer, estimator: str, bounces: int) -> None:
     """A ball of ambient radiance inside a closed white one: the geometric series again, without any light."""
@@ -298,7 +298,7 @@ def test_ambient_is_added_where_a_path_meets_the_surface(gpu: Renderer, estimato
     np.testing.assert_allclose(image, (2 - 0.5**bounces) * np.array([3, 2, 1]), rtol=0.02)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_blinn_phong_under_a_point_light(gpu: Renderer, estimator: str) -> None:
     for shininess, power in ((0, 1.0), (40, math.cos(math.radians(15)) ** 40), (1e6, 0.0)):
         phong = {"type": "blinn_phong", "diffuse": 0.3, "specular": [1, 0.5, 0.25], "shininess": shininess}

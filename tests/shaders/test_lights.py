@@ -13,7 +13,7 @@ from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
-from tests.marks import seldom
+from tests.marks import BY_ESTIMATOR
 from tests.probing import prober_of
 from tests.rendering import Images, assert_estimators_agree, document, render
 
@@ -80,7 +80,7 @@ def test_a_spot_of_no_angle_is_dark(gpu: Renderer) -> None:
     assert render(gpu, document([FLOOR], {"m": GREY}, lights=[_beam(0, 0)]), 4)[..., :3].max() == 0
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("diameter", [0.0, 1e-5, 0.53, 40.0, 90.0])
 def test_directional(gpu: Renderer, diameter: float, estimator: str) -> None:
     """E = irradiance * cos, exactly, while the disk is above the horizon."""
@@ -107,7 +107,7 @@ def test_a_disk_below_the_horizon_in_part(gpu: Renderer) -> None:
 MIRROR = {"type": "disney", "metallic": 1, "roughness": 0.05, "base_color": 1}
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_disks_are_seen_in_reflections_but_by_no_camera(gpu: Renderer, estimator: str) -> None:
     light = {"type": "directional", "direction": [0, 0, 1], "irradiance": 3, "angular_diameter": 30}
     assert render(gpu, document([], lights=[light]), 4).max() == 0  # the camera looks right into it
@@ -190,7 +190,7 @@ def test_disk_overhead(gpu: Renderer, d: float, sides: str) -> None:
 SHEARED = {"type": "quad", "origin": [0, 0, 1.1], "u": [0.6, 0.7, 0], "v": [0.9, 0, 0.1], "material": "lamp"}
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_parallelogram_light(gpu: Renderer, estimator: str) -> None:
     image = _spot(gpu, _lit(SHEARED), 1 << 16, estimator=estimator)
     np.testing.assert_allclose(image, 0.8 * _parallelogram_factor(SHEARED) * COLOR, rtol=0.03)
@@ -202,7 +202,7 @@ TURNED_MESH = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("estimator", seldom(ESTIMATORS, ["light", "bsdf"]))
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize("shape", [_quad(1.1, 0.9, 0.7, False), _quad(1.1, 0.9, 0.7), TURNED_MESH],
                          ids=["behind", "front", "mesh"])  # fmt: skip
 def test_both_sides_shine(gpu: Renderer, shape: dict[str, Any], estimator: str) -> None:
@@ -228,7 +228,7 @@ def test_the_inside_of_a_ball_shines_if_it_is_told_to(gpu: Renderer, sides: str,
 
 
 @pytest.mark.parametrize("both", [False, True])
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_ball_that_shines_on_both_sides_looks_the_same_from_outside(
     gpu: Renderer, estimator: str, both: bool
 ) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer
+from gpu import Renderer
 from tests.extremes.scenes import ball, icosphere, quad
-from tests.marks import seldom
+from tests.marks import BY_ESTIMATOR, seldom
 from tests.rendering import document, render
 
 Doc = dict[str, Any]
@@ -58,7 +58,7 @@ def test_a_lamp_within_the_body_that_the_camera_is_in(gpu: Renderer, body: str, 
         np.testing.assert_allclose(image, left(1.5), rtol=1e-4)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_matte_thing_within_the_body_that_the_camera_is_in(gpu: Renderer, estimator: str) -> None:
     """Lit by a point within it too: the light fades on both its ways."""
     wall = quad("wall", (-1, -1, -0.5), (2, 0, 0), (0, 2, 0))
@@ -68,7 +68,7 @@ def test_a_matte_thing_within_the_body_that_the_camera_is_in(gpu: Renderer, esti
     np.testing.assert_allclose(image, 0.5 / math.pi * 3 / 0.75**2 * left(1.5 + 0.75), rtol=1e-4)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 @pytest.mark.parametrize(("z", "a", "b"), [(4, 4, 2), (1.5, 3.5, 2), (0, 2, 1), (-1.5, 0.5, 0)])
 def test_a_body_within_a_body(gpu: Renderer, estimator: str, z: float, a: float, b: float) -> None:
     """From outside, from between, from within both, and behind the inner one."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer
+from tests.marks import BY_ESTIMATOR
 from tests.rendering import document, picture, render
 
 STRAIGHT = {"position": [0, 0, 4], "target": [0, 0, 0], "vfov": 0.02}
@@ -153,7 +154,7 @@ def test_cutoff_decides(gpu: Renderer, alpha: float, cutoff: float, met: int) ->
     assert image[3] == met
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_furnace_with_veils_stays_white(gpu: Renderer, estimator: str) -> None:
     """White surfaces of any alpha in a constant sky are invisible, as the paths that pass and those that bounce meet
     the same radiance."""
@@ -164,7 +165,7 @@ def test_a_furnace_with_veils_stays_white(gpu: Renderer, estimator: str) -> None
     assert image[..., :3].mean() == pytest.approx(1, abs=3e-3)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_lamp_of_half_alpha_gives_half_the_light(gpu: Renderer, estimator: str) -> None:
     lamp = {**SHAPES["quad"], "material": "veil", "u": [0, 2, 0], "v": [2, 0, 0]}
     full, half = (

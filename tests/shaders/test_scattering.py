@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer, layout
+from gpu import Renderer, layout
 from gpu.layout.bindings import Slot
 from service.scene.half_space import h_function, single_scattering_albedo
 from tests import stats
 from tests.extremes.scenes import ball, icosphere, quad
+from tests.marks import BY_ESTIMATOR
 from tests.probing import prober_of
 from tests.rendering import assert_estimators_agree, document, picture, render
 
@@ -96,7 +97,7 @@ def test_distances_towards_lamps_follow_their_density(gpu: Renderer, lamps: list
     assert stats.chi_square(observed, n * shares / shares.sum()) > stats.sidak(1e-3, 9)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_what_absorbs_lets_through_what_beer_and_lambert_say(gpu: Renderer, estimator: str) -> None:
     """Also beside what the material itself absorbs, and over the whole way to a lamp."""
     tinted = {**CLEAR, "attenuation_color": [0.5, 0.5, 0.5], "attenuation_distance": 1.0}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer
+from gpu import Renderer
 from gpu.layout import LightKind, Uniforms
 from gpu.layout.bindings import Slot
 from gpu.tables import alias_table, sky
@@ -17,6 +17,7 @@ from service.pack.edits.cache import PackCache
 from service.problems import InvalidDocument
 from service.scene import parse_scene
 from tests import stats
+from tests.marks import BY_ESTIMATOR
 from tests.probing import Prober, prober_of
 from tests.rendering import Images, document, render
 
@@ -220,7 +221,7 @@ def test_negative_texels_of_a_face_are_told() -> None:
     assert result.arrays.environment is not None and result.arrays.environment.texels.min() == 0
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("estimator", BY_ESTIMATOR)
 def test_a_cube_of_one_radiance_is_a_furnace(gpu: Renderer, estimator: str) -> None:
     images = {name: np.full((3, 3, 3), (2, 1, 0.5), np.float32) for name in FACES}
     ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}

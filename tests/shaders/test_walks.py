@@ -10,6 +10,7 @@ import trimesh
 
 from gpu import Renderer
 from tests.extremes.scenes import ball, icosphere, quad
+from tests.marks import seldom
 from tests.rendering import assert_estimators_agree, document, picture, render
 
 Doc = dict[str, Any]
@@ -33,7 +34,7 @@ NO_GLOSS = {"principled": {"specular": 0}, "openpbr": {"specular_weight": 0}}
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("color", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize("color", seldom([0.2, 0.5, 0.8], [0.5]))
 def test_half_spaces_show_the_colour(gpu: Renderer, model: str, color: float) -> None:
     """Of radii that differ by channel, too; by one event, as a walk counts."""
     material = MODELS[model](color, **NO_GLOSS[model])
@@ -58,7 +59,7 @@ WHITE_MATERIALS = {
 }
 
 
-@pytest.mark.parametrize("shape", WHITE_BODIES)
+@pytest.mark.parametrize("shape", seldom(WHITE_BODIES, WHITE_BODIES[:1]))
 @pytest.mark.parametrize("coat", [0, 1])
 def test_what_is_white_gains_nothing_and_loses_what_the_steps_cut_off(gpu: Renderer, shape: Doc, coat: int) -> None:
     """One kernel serves all of them, as there is one of each out of sight."""
@@ -145,6 +146,7 @@ def test_milk_in_a_glass_is_given_by_the_glass(gpu: Renderer) -> None:
     np.testing.assert_allclose(images[0].mean((0, 1)), images[1].mean((0, 1)), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_a_smooth_mesh_shows_what_its_facets_do(gpu: Renderer) -> None:
     """Walks begin and end at the triangles, on what is hollow, too, wherever vertex normals lift other rays."""
     ring = trimesh.creation.torus(0.7, 0.35, major_sections=32, minor_sections=16)

@@ -198,7 +198,7 @@ def test_a_photograph_is_fitted_by_hand_in_linear_light(editor: Editor) -> None:
 @pytest.mark.parametrize(
     ("size", "more"),
     [
-        ((1280, 800), {"color_scheme": "light"}),
+        pytest.param((1280, 800), {"color_scheme": "light"}, marks=pytest.mark.slow),
         ((390, 844), {"has_touch": True, "is_mobile": True}),
         ((1024, 768), {"forced_colors": "active"}),
     ],

@@ -41,6 +41,7 @@ def test_far_ranges_are_slid_over_by_factors(page: Page, low: float, high: float
     )
 
 
+@pytest.mark.slow
 def test_the_sliders_of_microfacet_follow_the_distribution(editor: Editor) -> None:
     editor.settled()
     page = editor.page

@@ -103,7 +103,10 @@ def test_what_follows_from_others_shows_no_value_of_its_own(editor: Editor) -> N
     assert index.input_value() == ""
 
 
-@pytest.mark.parametrize(("shelf", "choice"), [("scenes", "cornell"), ("environments", None), ("library", None)])
+@pytest.mark.parametrize(
+    ("shelf", "choice"),
+    [("scenes", "cornell"), ("library", None), pytest.param("environments", None, marks=pytest.mark.slow)],
+)
 def test_presets_change_the_picture(editor: Editor, shelf: str, choice: str | None) -> None:
     before = editor.settled()
     script = "all => all.map((each) => each.dataset.value)"

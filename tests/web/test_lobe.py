@@ -153,6 +153,7 @@ def test_glass_is_seen_on_both_sides(lobe: Editor) -> None:
     assert any(abs(row["theta_deg"]) > 90 and row["f_g"] > 0 for row in table(lobe))
 
 
+@pytest.mark.slow
 def test_both_variants_are_drawn_over_each_other(lobe: Editor) -> None:
     page = lobe.page
     paste(lobe, {"type": "principled", "roughness": 0.3})
@@ -240,6 +241,7 @@ def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
     assert table(lobe)[0]["f_g"] * math.pi == pytest.approx(green, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_means_are_of_the_values_and_not_of_a_small_picture(lobe: Editor, server: Server, tmp_path: Path) -> None:
     """Of bright values, of alpha, and of a pattern that a small picture in sRGB would make too dark."""
     script = """async ([asset, reads]) => {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import pytest
 from playwright.sync_api import Page
 
 from tests.serving import Server
@@ -139,6 +140,7 @@ def test_a_saved_material_is_used_in_another_scene(editor: Editor, server: Serve
     server.http.delete("/v1/documents/materials/worn%20brass")
 
 
+@pytest.mark.slow
 def test_a_refused_material_changes_nothing(editor: Editor, server: Server) -> None:
     page = editor.page
     editor.settled()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from tests.web.conftest import Editor
 from tests.web.editing import halves
 
@@ -63,6 +65,7 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     assert page.input_value(f"{BENEATH} [data-field=wrap] select") == "mirror"
 
 
+@pytest.mark.slow
 def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> None:
     page = editor.page
     for parameter in ("roughness", "base_color"):

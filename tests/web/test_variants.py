@@ -135,6 +135,7 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     assert editor.page.evaluate(aspect) == pytest.approx(whole, rel=0.02), "all of the view stays"
 
 
+@pytest.mark.slow
 def test_every_model_is_taken(editor: Editor) -> None:
     editor.settled()
     models = editor.page.eval_on_selector_all("#model option", "all => all.map((each) => each.value)")

@@ -152,7 +152,7 @@ def test_reading_all_renders_of_a_database_needs_no_start(folder: Path) -> None:
         assert [each.unfit is not None for each in stored_renders(file)].count(True) == 1
 
 
-@pytest.mark.parametrize("name", seldom(WITH_RENDERS, WITH_RENDERS[1:-1]))
+@pytest.mark.parametrize("name", seldom(WITH_RENDERS, WITH_RENDERS[:-1]))
 def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, name: str, tmp_path: Path) -> None:
     """Also where one row does not fit."""
     folder = frozen.opened(name, tmp_path / "data")
