@@ -12,6 +12,7 @@
 #include "bsdf/lobes/openpbr/diffuse.glsl"
 #include "bsdf/lobes/openpbr/coat.glsl"
 #include "bsdf/lobes/openpbr/fuzz.glsl"
+#include "bsdf/lobes/openpbr/film.glsl"
 
 #if HAS_OPENPBR
 // An index as the tables have it, at least 1 and at most their last; `excess` is the share of what a boundary of that
@@ -82,17 +83,7 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
 #if HAS_FILM
-    film_surface(m, s);
-    if (s.film > 0.0) {
-#if HAS_CLEARCOAT
-        s.film_outer = mix(1.0, max(m.coat_ior, 1.0), m.clearcoat * (1.0 - s.transmission));
-#endif
-        s.film_bends = s.turned_out ? 1.0 / s.eta_outside : s.eta_outside;
-        // A coat that is denser than the base does not reflect all of slanting light: its index has been turned over.
-        s.film_base = s.film_outer * s.film_bends;
-        if (!s.turned_out && m.ior < s.film_outer) s.film_base = max(1.0, s.film_outer / s.eta_outside);
-        film_metal_index(s.specular_weight * s.base_color, s.specular_color, s.film_outer, s);
-    }
+    openpbr_film(m, s);
 #endif
     s.is_delta = roughness < LEAST_ROUGHNESS;
 #if HAS_THIN_WALLS
