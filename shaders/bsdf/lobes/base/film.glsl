@@ -9,7 +9,7 @@
 const float FILM_LEAST = 0.03; // um: below it the film fades into the bare boundary, whose metal may have another curve
 // exp(p x) has vanished at this path difference, um; the sine of a much greater one is not known in single precision.
 const float FILM_LONGEST = 60.0;
-const float FILM_TOTAL = 1e30;
+const float FILM_TOTAL = 1e30; // stands for the sine of what is reflected in full
 const int FILM_WAVES = 4;
 const vec3 FILM_DECAY[FILM_WAVES] = vec3[]( // -Re p, 1/um
     vec3(0.94786, 0.84141, 2.31745),
