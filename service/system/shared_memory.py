@@ -23,7 +23,9 @@ class Block(mmap.mmap):
     descriptor: int
 
 
-_blocks: weakref.WeakValueDictionary[int, Block] = weakref.WeakValueDictionary()  # by address
+# By address. A plain dict, as its `copy` is one step of the interpreter: blocks come and go in other threads, and a
+# WeakValueDictionary that is listed meanwhile raises RuntimeError.
+_blocks: dict[int, weakref.ref[Block]] = {}
 
 
 def block(size: int) -> Block:
@@ -36,8 +38,19 @@ def block(size: int) -> Block:
         raise
     made.descriptor = descriptor
     weakref.finalize(made, os.close, descriptor)
-    _blocks[_address(np.frombuffer(made, np.uint8))] = made
+    _register(made)
     return made
+
+
+def _register(made: Block) -> None:
+    """List the block for as long as it lasts."""
+    address = _address(np.frombuffer(made, np.uint8))
+
+    def forget(dead: weakref.ref[Block]) -> None:
+        if _blocks.get(address) is dead:  # else a new block has the address by now
+            del _blocks[address]
+
+    _blocks[address] = weakref.ref(made, forget)
 
 
 def locate(part: memoryview) -> tuple[Block, int] | None:
@@ -45,8 +58,9 @@ def locate(part: memoryview) -> tuple[Block, int] | None:
     if not part.nbytes:
         return None
     at = _address(np.frombuffer(part, np.uint8))
-    for address, found in list(_blocks.items()):
-        if address <= at < address + len(found):
+    for address, listed in _blocks.copy().items():
+        found = listed()
+        if found is not None and address <= at < address + len(found):
             return found, at - address
     return None
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -79,3 +81,21 @@ def test_nothing_is_left_of_a_block() -> None:
     del kept
     gc.collect()
     assert len(shared_memory._blocks) == known
+
+
+def test_blocks_may_come_and_go_while_others_look_for_theirs() -> None:
+    """A thread that failed to look would leave its stream without another word."""
+    kept = [shared_memory.block(LEAST) for _ in range(50)]
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(1) as other:
+            coming = other.submit(lambda: [shared_memory.block(LEAST) and None for _ in range(2000)])
+            looks = 0
+            while not coming.done():
+                assert locate(memoryview(kept[looks % len(kept)])) == (kept[looks % len(kept)], 0)
+                looks += 1
+            coming.result()
+    finally:
+        sys.setswitchinterval(usual)
+    assert looks > 10
