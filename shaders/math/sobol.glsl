@@ -27,7 +27,7 @@ struct Sampler {
     uint seed;           // of this pixel or block, picture and replicate
     uint index;          // of the sample
     uint index_reversed; // its bits, mirrored
-#if SAMPLER == 0 && !ADAPTIVE
+#if !ADAPTIVE
     uvec2 shift; // of the digits of x and y, mirrored
     uint quad;   // twice the place, in the block, of this pixel's 2 x 2
 #endif
@@ -63,7 +63,7 @@ uint sobol_pascal(uint v) {
 
 float sobol_unit(uint x) { return float(x >> 8u) * 5.9604645e-8; } // 2^-24: never rounds up to 1
 
-#if SAMPLER == 0 && !ADAPTIVE
+#if !ADAPTIVE
 // Shifts of the first eight digits of x and y by the bits of a pixel's place: its column and row in its square of 2 x
 // 2, and those of the square in the block. They were found by a search among 2^64: they leave the least error of steps,
 // ramps and blobs on the square after blurring, at 1, 2, 4, ... 256 samples: a half after a blur of one pixel, a third
@@ -85,14 +85,14 @@ uint sobol_seed(uvec2 at, uint replicate) {
 // `replicate` names one of the independent scrambles; 0 is the picture's own.
 Sampler sobol_begin(uvec2 pixel, uint index, uint replicate) {
     uint own = sobol_seed(pixel, replicate);
-#if SAMPLER == 0 && !ADAPTIVE
+#if !ADAPTIVE
     uint in_quad = (pixel.x & 1u) | (pixel.y & 1u) << 1u, quad = (pixel.x >> 1u & 1u) | (pixel.y & 2u);
     uint block = sobol_seed(pixel >> 2u, 0x9e3779b9u);
     uvec2 apart = sobol_apart(sobol_place(in_quad, block >> 3u * quad), SOBOL_COLUMN, SOBOL_ROW)
         ^ sobol_apart(sobol_place(quad, block >> 12u), SOBOL_QUAD_COLUMN, SOBOL_QUAD_ROW);
     // Beyond these eight digits each pixel has its own.
     uvec2 shift = apart | uvec2(own, sobol_hash(own ^ 0x5bd1e995u)) << 8u;
-    return Sampler(replicate == 0u ? block : own, index, bitfieldReverse(index), shift, 2u * quad);
+    return Sampler(SAMPLER == 0 && replicate == 0u ? block : own, index, bitfieldReverse(index), shift, 2u * quad);
 #else
     return Sampler(own, index, bitfieldReverse(index));
 #endif
@@ -102,23 +102,21 @@ vec2 sobol_units(uvec2 bits) { return vec2(sobol_unit(bits.x), sobol_unit(bits.y
 
 uvec2 sobol_bits(Sampler s, uint pair) {
     uint seed = sobol_hash(s.seed ^ (pair * 0x9e3779b9u));
-#if SAMPLER == 0
+    if (SAMPLER == 1) {
+        uint first = sobol_hash(seed + s.index * 0x85ebca6bu);
+        return uvec2(sobol_hash(first ^ seed), sobol_hash(first ^ 0x27d4eb2fu));
+    }
     uint shuffled = bitfieldReverse(sobol_scramble(s.index_reversed, seed));
     uint seed_x = sobol_hash(seed ^ 0x68bc21ebu);
     uint seed_y = sobol_hash(seed ^ 0x02e5be93u);
     uvec2 digits = uvec2(shuffled, sobol_pascal(shuffled));
-#if SAMPLER == 0 && !ADAPTIVE
+#if !ADAPTIVE
     // The four squares of a block change places from pair to pair: where an error depends on two pairs, points that lie
     // apart in both alike would do the same twice.
     digits ^= s.shift ^ sobol_apart(seed >> s.quad, SOBOL_COLUMN, SOBOL_ROW);
 #endif
     uint x = bitfieldReverse(sobol_scramble(digits.x, seed_x));
     uint y = bitfieldReverse(sobol_scramble(digits.y, seed_y));
-#else
-    uint x = sobol_hash(seed + s.index * 0x85ebca6bu);
-    uint y = sobol_hash(x ^ 0x27d4eb2fu);
-    x = sobol_hash(x ^ seed);
-#endif
     return uvec2(x, y);
 }
 

@@ -14,11 +14,8 @@ Asked bsdf_ask(Interaction here, vec3 d) {
 
 // Samples a direction in the shading frame as the estimator does.
 LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
-#if ESTIMATOR == ESTIMATOR_UNIFORM
-    return bsdf_sample_uniform(s, wo, u_lobe, u);
-#else
+    if (ESTIMATOR == ESTIMATOR_UNIFORM) return bsdf_sample_uniform(s, wo, u_lobe, u);
     return bsdf_sample(s, wo, u_lobe, u);
-#endif
 }
 
 // The value and the density of a direction.
@@ -28,9 +25,7 @@ Scatter bsdf_eval_world(Surface s, Interaction here, Asked asked) {
 #else
     Scatter scatter = bsdf_eval(s, here.wo, asked.wi);
 #endif
-#if ESTIMATOR == ESTIMATOR_UNIFORM
-    if (asked.goes_on) scatter.pdf = asked.lobe.scatter.pdf;
-#endif
+    if (ESTIMATOR == ESTIMATOR_UNIFORM && asked.goes_on) scatter.pdf = asked.lobe.scatter.pdf;
     if (asked.goes_on && (asked.lobe.is_delta || bsdf_enters(asked.lobe))) scatter = asked.lobe.scatter;
     return scatter;
 }

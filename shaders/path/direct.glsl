@@ -14,8 +14,9 @@ LightContext direct_context(SurfacePoint at, vec3 front, vec3 facing, bool trans
 // more samples: a doubling costs a third more time and leaves a third of a matte ball's error. After the first bounce
 // four samples would cost more than they are worth.
 uint direct_doublings(Surface s, uint bounce) {
-#if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
-    return environment_varies() && surface_is_broad(s) ? (bounce == 0u ? 2u : 1u) : 0u;
+#if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
+    bool samples_lights = ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT;
+    return samples_lights && environment_varies() && surface_is_broad(s) ? (bounce == 0u ? 2u : 1u) : 0u;
 #else
     return 0u;
 #endif
@@ -27,9 +28,7 @@ float direct_share(Surface s, uint bounce) { return 1.0 / float(1u << direct_dou
 // Whether the estimator counts that sample of a light, at a surface of the shape `id`.
 bool direct_counts(LightSample light, uint id) {
     bool counts = light.pdf > 0.0;
-#if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
-    counts = counts && !light.extended;
-#endif
+    if (ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM) counts = counts && !light.extended;
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
     counts = counts && light.id != id; // rounding may put a point on the inside of a ball outside of it
 #endif
@@ -38,18 +37,14 @@ bool direct_counts(LightSample light, uint id) {
 
 // The weight of a light's sample; found_pdf is the density with which the BSDF would have given its direction.
 float direct_weight(LightSample light, float found_pdf) {
-    float weight = 1.0;
-#if ESTIMATOR == ESTIMATOR_MIS
-    if (light.extended) weight = power_heuristic(light.pdf, found_pdf);
-#endif
-    return weight;
+    return ESTIMATOR == ESTIMATOR_MIS && light.extended ? power_heuristic(light.pdf, found_pdf) : 1.0;
 }
 
 // The weight of emission that the path has found by chance.
 float direct_found_weight(Path path) {
     float weight = path.counts && !caustics_leave_out(path) ? 1.0 : 0.0;
-#if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
-    if (path.at.light != NONE && path.found_pdf < PDF_DELTA) {
+#if HAS_EMISSION
+    if (ESTIMATOR == ESTIMATOR_MIS && path.at.light != NONE && path.found_pdf < PDF_DELTA) {
         Hit hit = path.hit;
         hit.t += path.travelled; // from the surface where lights were sampled
         float light_pdf = lights_pdf(path.at.light, hit, path.at, path.lit, path.d);

@@ -9,9 +9,7 @@ vec3 found_light_disks(vec3 d, float pdf) {
     do {
         Light l = light_load(uniforms.sun_first + i);
         vec3 c = directional_light_radiance(l, d);
-#if ESTIMATOR == ESTIMATOR_MIS
-        c *= power_heuristic(pdf, directional_light_pdf(l) * l.probability);
-#endif
+        if (ESTIMATOR == ESTIMATOR_MIS) c *= power_heuristic(pdf, directional_light_pdf(l) * l.probability);
         if (i < uniforms.sun_count) sum += c; // a kernel with every flag raised may have no disk
     } while (++i < uniforms.sun_count);
     return sum;
@@ -34,9 +32,7 @@ vec3 found_light_outside(vec3 d, float pdf, bool scattered, bool sunless) {
 #if HAS_ENVIRONMENT
     vec4 l = environment_radiance(d, !sunless);
     arriving = l.rgb;
-#if ESTIMATOR == ESTIMATOR_MIS
-    arriving *= power_heuristic(pdf, l.a * uniforms.environment_probability);
-#endif
+    if (ESTIMATOR == ESTIMATOR_MIS) arriving *= power_heuristic(pdf, l.a * uniforms.environment_probability);
 #endif
 #if HAS_SUN_DISKS
     if (scattered && !sunless) arriving += found_light_disks(d, pdf);

@@ -141,7 +141,7 @@ Sampler light_path_sampler(uvec2 pixel, uint period, uint part) {
     uint place = low + pixel.y * uniforms.resolution.x + pixel.x;
     if (place < low) high++;
     Sampler rng = sobol_begin(uvec2(high, 0u), place, 0x6c696768u + part);
-#if SAMPLER == 0 && !ADAPTIVE
+#if !ADAPTIVE
     rng.shift = uvec2(0u);
     rng.quad = 0u;
 #endif

@@ -43,10 +43,9 @@ bool normal_map_keeps(Surface s, LobeSample lobe) {
 // The sampled direction in world space, folded back to its lobe's side of the surface.
 vec3 normal_map_direction(Interaction here, LobeSample lobe) {
     vec3 d = basis_to_world(here.basis, lobe.wi);
-#if ESTIMATOR == ESTIMATOR_UNIFORM
     // Uniform directions are drawn about the surface itself, where nothing needs folding.
-    if (here.mapped && !lobe.is_delta) d = basis_to_world(basis_make(here.fold), lobe.wi);
-#endif
+    bool uniform_about_surface = ESTIMATOR == ESTIMATOR_UNIFORM && here.mapped && !lobe.is_delta;
+    if (uniform_about_surface) d = basis_to_world(basis_make(here.fold), lobe.wi);
     float across = dot(d, here.fold);
     if (here.mapped && across * (lobe.coated ? 1.0 : lobe.wi.z) < 0.0) d -= 2.0 * across * here.fold;
     return d;
