@@ -144,6 +144,11 @@ def loops_from_uniforms() -> dict[str, object]:
     return turns | SOON
 
 
+def choices_from_uniforms() -> dict[str, object]:
+    """The defines of a kernel that reads from the uniforms which estimator and which sampler it is for."""
+    return {"ESTIMATOR": "int(uniforms.estimator)", "SAMPLER": "int(uniforms.sampler)"}
+
+
 def counts(scene: SceneArrays) -> dict[str, object]:
     """The defines for the numbers of shapes in the kernel's loops, for the numbers of materials and lights where
     those are few, and for the places of textures."""

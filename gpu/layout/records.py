@@ -351,6 +351,8 @@ class Uniforms(Record):
     footprint_share: f32  # of a pixel's width: that of the footprint of one camera ray; see gpu.picture.filters
     filter_glossy: f32  # least roughness after a path's first scattering
     glint_chance: f32  # least of reflection, and of refraction, at a smooth surface that the camera sees
+    estimator: u32  # its place in `gpu.settings.ESTIMATORS`, for a kernel that was not compiled for one
+    sampler: u32  # likewise
     # These two stay the last: kernels without instances lack them (gpu/kernels/instances_glsl.py).
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's

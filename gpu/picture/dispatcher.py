@@ -15,7 +15,7 @@ from gpu.layout.bindings import Slot
 from gpu.layout.pixel_layers import VECTOR_BYTES
 from gpu.picture import filters
 from gpu.picture.schedule import Tile, group_stride
-from gpu.settings import RenderSettings
+from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 _ALIGNED = 32  # pixels; on every driver a binding may begin at a multiple of this
 
@@ -72,6 +72,7 @@ class Dispatcher:
             s.seed,
         )
         uniforms["footprint_share"] = filters.FOOTPRINT[s.filter]
+        uniforms["estimator"], uniforms["sampler"] = ESTIMATORS.index(s.estimator), SAMPLERS.index(s.sampler)
         uniforms["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
         uniforms["filter_glossy"] = s.filter_glossy
         uniforms["slot_width"] = s.width
