@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,8 @@ class KernelCache:
             raise CompileError(f"{entry}: {source.explain(str(error))}") from error
         self.last_compile_ms = (time.perf_counter() - start) * 1e3
         on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
-        log.info(f"compiled {entry}", {"flags": "+".join(on) or "none", "ms": round(self.last_compile_ms)})
+        key = sha256(source.text.encode()).hexdigest()[:12]
+        log.info(f"compiled {entry}", {"key": key, "flags": "+".join(on) or "none", "ms": round(self.last_compile_ms)})
         return kernel
 
     def release(self) -> None:
