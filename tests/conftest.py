@@ -7,7 +7,7 @@ import importlib.util
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,8 @@ import pytest
 from gpu import ContextError, Renderer
 from gpu import context as contexts
 from service.logs.formatters import Console
+from tests import kernel_count
+from tests.families import FamilyRenderer
 from tests.privileges import shed
 from tests.rendering import release_pictures
 from tests.serving import Server
@@ -59,8 +61,10 @@ def pytest_configure(config: pytest.Config) -> None:
     folder = tempfile.TemporaryDirectory(prefix="sunbox-tests-")
     config.add_cleanup(folder.cleanup)
     shed(Path(folder.name))
+    count = kernel_count.start(config)
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Failures(config))
+        config.pluginmanager.register(Totals(count))
 
 
 class Failures:
@@ -77,6 +81,21 @@ class Failures:
             terminal.write_line(f"\nFAILED {report.nodeid} [{report.when}, {report.duration:.0f} s]{why}"[:300])
 
 
+class Totals:
+    """Says at the end how many path kernels the run has compiled, the parts of `make test` before it included."""
+
+    def __init__(self, count: kernel_count.KernelCount) -> None:
+        self.count = count
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        terminalreporter.write_line(f"path kernels: {self.count.total} of at most {kernel_count.MOST}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    yield from kernel_count.watch(item)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def pictures() -> Iterator[None]:
     """Pictures last as long as the tests of their file."""
@@ -87,16 +106,17 @@ def pictures() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def gpu() -> Iterator[Renderer]:
+def gpu() -> Iterator[FamilyRenderer]:
     """A renderer for all tests of the session. Skips where there is no GL, saying why; never in CI.
 
     With llvmpipe it has one thread: with more it would take all processors from what the tests beside it wait for, as
-    the renderers of servers are nicer.
+    the renderers of servers are nicer. Scenes get the kernels of their families, but in tests with the mark `exact`.
+    Unoptimised kernels (GALLIVM_PERF=nopt) are there in 0.7 of the time, but trace 2.3 to 4.5 times slower.
     """
     try:
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("LP_NUM_THREADS", "1")
-            renderer = Renderer()
+            renderer = FamilyRenderer()
     except ContextError as error:
         if os.environ.get("CI"):
             raise
@@ -106,10 +126,16 @@ def gpu() -> Iterator[Renderer]:
 
 
 @pytest.fixture(autouse=True)
-def _current_context(request: pytest.FixtureRequest) -> None:
-    """Make the session's context current: the last test may have made another, and a probe calls GL by itself."""
-    if "gpu" in request.fixturenames:
-        contexts.use(request.getfixturevalue("gpu").context)
+def _current_context(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Make the session's context current: the last test may have made another, and a probe calls GL by itself. Give
+    scenes the kernels that the product gives them in tests with the mark `exact`."""
+    if "gpu" not in request.fixturenames:
+        yield
+        return
+    renderer: FamilyRenderer = request.getfixturevalue("gpu")
+    contexts.use(renderer.context)
+    with renderer.exact() if request.node.get_closest_marker("exact") else nullcontext():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -31,6 +31,8 @@ from tests.marks import seldom
 from tests.serving import PATIENCE_S, SCENE
 from tests.supervisors import Ears, with_supervisor
 
+pytestmark = pytest.mark.exact
+
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}
 KEPT = 4  # disk caches

@@ -21,6 +21,8 @@ from tests.gpu.flag_scenes import FLOOR, IMAGES, LAMP, SCENES, Doc, T, lit, made
 from tests.marks import seldom
 from tests.rendering import document
 
+pytestmark = pytest.mark.exact
+
 ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS", "INSTANCES"}  # raised in the tests of glTF files, textured lights, instances
 
 

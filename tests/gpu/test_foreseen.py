@@ -21,6 +21,8 @@ from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE
 from tests.supervisors import SIZE, Ears, arrays_of, with_supervisor
 
+pytestmark = pytest.mark.exact
+
 
 @pytest.mark.slow
 def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:

@@ -14,6 +14,8 @@ from gpu.kernels.cache import KernelCache
 from service.worker.helpers import compile_client
 from tests.supervisors import arrays_of
 
+pytestmark = pytest.mark.exact
+
 TEXT = """
 layout(local_size_x = 8) in;
 layout(std430, binding = 0) buffer B { uint b[]; };

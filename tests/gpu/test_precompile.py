@@ -25,6 +25,8 @@ from service.worker.helpers.compile_main import LOCKS
 from tests.serving import PATIENCE_S, wait_until
 from tests.supervisors import LINEAR, SCENES, SIZE, Ears, compile_helpers, with_supervisor
 
+pytestmark = pytest.mark.exact
+
 COLD = {**SIZE, "clamp": 5.0}  # compiled in
 
 AHEAD = """

@@ -59,7 +59,7 @@ def test_convex_furnace(gpu: Renderer, estimator: str, filter_name: str) -> None
 @pytest.mark.parametrize(
     ("estimator", "a", "n", "tolerance"),
     [("mis", 0.5, 6, 6e-3), ("bsdf", 0.5, 6, 6e-3), ("uniform", 0.5, 6, 6e-3), ("light", 0.5, 6, 0.03),
-     ("mis", 0.97, 1023, 0.02)],
+     pytest.param("mis", 0.97, 1023, 0.02, marks=pytest.mark.exact)],  # its paths are long
 )  # fmt: skip
 def test_closed_room_holds_its_geometric_series(
     gpu: Renderer, estimator: str, a: float, n: int, tolerance: float
@@ -249,6 +249,7 @@ def test_editing_a_scene_equals_making_it_anew(gpu: Renderer) -> None:
     assert not (made.read() == anew.read()).all()
 
 
+@pytest.mark.exact  # it takes many samples
 def test_many_samples_do_not_drift(gpu: Renderer) -> None:
     """A plain sum in 32 bits is 0.25 % off after these, and 1 % after the million that `make extremes` takes."""
     scene = document([], environment={"type": "constant", "radiance": [0.1, 0.7, 1e-6]})
@@ -259,6 +260,7 @@ def test_many_samples_do_not_drift(gpu: Renderer) -> None:
     assert made.noise() < 1e-6
 
 
+@pytest.mark.exact  # it takes many samples
 def test_noise_tells_the_real_error(gpu: Renderer) -> None:
     weights = np.array([0.2126, 0.7152, 0.0722])
     scene = _showcase()

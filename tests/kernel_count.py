@@ -1,0 +1,94 @@
+"""Counts the path kernels of a run of the tests: each takes LLVM seconds, so that their number is bounded.
+
+Counted are the kernels of pictures in the tests' own processes and in servers, each once a run, whatever worker of
+xdist asked for it first. Probes of single functions stand beside.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ENTRIES = ("pathtrace.comp", "lighttrace.comp", "guides.comp")
+MOST = 220
+# A line of a server's log, on a terminal or as JSON.
+COMPILED = re.compile(r"compiled (?:pathtrace|lighttrace|guides)\.comp\b.*?\bkey[\"']?[=:] ?[\"']?([0-9a-f]{12})")
+VARIABLE = "SUNBOX_TEST_KERNELS"  # the file in which all processes of a run write down what they compiled
+
+
+class KernelCount(logging.Handler):
+    """The keys of the kernels that a run has compiled, each with the test that brought it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(logging.INFO)
+        self._path = path
+        self.test = ""
+        self._excess: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.msg in [f"compiled {entry}" for entry in ENTRIES] and isinstance(record.args, dict):
+            self.add([str(record.args["key"])])
+
+    def add(self, keys: list[str]) -> None:
+        """Write down those that are new to the run."""
+        with self._path.open("a+") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            file.seek(0)
+            known = {line.split()[0] for line in file}
+            for key in dict.fromkeys(keys):
+                if key not in known:
+                    known.add(key)
+                    file.write(f"{key} {self.test}\n")
+                    if len(known) > MOST:
+                        self._excess.append(key)
+
+    def excess(self) -> int:
+        """How many came on top of `MOST` since the last call."""
+        found, self._excess = len(self._excess), []
+        return found
+
+    @property
+    def total(self) -> int:
+        return len(self._path.read_text().splitlines())
+
+
+_count: KernelCount | None = None
+
+
+def start(config: pytest.Config) -> KernelCount:
+    """Begin to count. The first process of a run makes the file; its workers and servers inherit the variable."""
+    global _count
+    if VARIABLE not in os.environ:
+        handle, name = tempfile.mkstemp(prefix="sunbox-kernels-")
+        os.close(handle)
+        os.environ[VARIABLE] = name
+        config.add_cleanup(lambda: (os.environ.pop(VARIABLE), Path(name).unlink()))
+    _count = KernelCount(Path(os.environ[VARIABLE]))
+    logger = logging.getLogger("gpu.kernels.cache")
+    logger.setLevel(logging.INFO)
+    logger.addHandler(_count)
+    config.add_cleanup(lambda: logger.removeHandler(_count))
+    return _count
+
+
+def read_log(log: Path) -> None:
+    """Count what a server says in its log that it has compiled."""
+    if _count is not None:
+        _count.add(COMPILED.findall(log.read_text(errors="replace")))
+
+
+def watch(item: pytest.Item) -> Iterator[None]:
+    """A test's time: it fails where it brings a kernel too many."""
+    assert _count is not None
+    _count.test = item.nodeid
+    yield
+    more = _count.excess()
+    if more:
+        pytest.fail(f"brings {more} path kernel(s) beyond the {MOST} of a run: give its scenes a family's kernel")
