@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Locator, Page
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -199,14 +200,13 @@ def test_a_photograph_is_fitted_by_hand_in_linear_light(editor: Editor) -> None:
     ("size", "more"),
     [
         pytest.param((1280, 800), {"color_scheme": "light"}, marks=pytest.mark.slow),
-        ((390, 844), {"has_touch": True, "is_mobile": True}),
+        ((390, 844), {"touch": True}),
         ((1024, 768), {"forced_colors": "active"}),
     ],
 )
-def test_everybody_can_compare(browser: Browser, server: Server, size: tuple[int, int], more: dict[str, Any]) -> None:
-    page = browser.new_page(viewport={"width": size[0], "height": size[1]}, **more)
-    editor = Editor(page)
-    editor.open(server.url)
+def test_everybody_can_compare(visit: Callable[..., Editor], size: tuple[int, int], more: dict[str, Any]) -> None:
+    editor = visit(size, scale=1, **more)
+    page = editor.page
     editor.settled()
     bar = page.locator("#comparison")
     page.locator("#compare").press("Enter")
@@ -230,7 +230,6 @@ def test_everybody_can_compare(browser: Browser, server: Server, size: tuple[int
         assert stage["height"] > box["height"], "the picture has more room than the bar"
         assert page.get_by_role("button", name="Done").bounding_box()["x"] < size[0] - 30, "the way out is in sight"  # type: ignore[index]
     assert editor.complaints == []
-    page.close()
 
 
 def verdict(editor: Editor) -> str:

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
-from playwright.sync_api import Browser, Page, Request
+from playwright.sync_api import Page, Request
 
-from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.modules import call
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser, server: Server) -> Iterator[Page]:
-    opened = browser.new_page()
-    opened.goto(server.url + "/icon.svg")  # any page of the same origin
-    yield opened
-    opened.close()
 
 
 @pytest.mark.parametrize(("low", "high"), [(0, 1e6), (0.001, 10), (1e-3, 1e6), (0.01, 2), (0.1, 10), (0, 1000)])

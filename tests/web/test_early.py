@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from playwright.sync_api import BrowserContext, WebSocketRoute
+from playwright.sync_api import WebSocketRoute
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -32,8 +32,8 @@ class Slow:
         server.on_message(hear)
 
 
-def test_nothing_is_lost_before_there_is_a_picture(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
+def test_nothing_is_lost_before_there_is_a_picture(blank: Editor, server: Server) -> None:
+    editor = blank
     slow = Slow(editor)
     editor.open(server.url)
     editor.settled()

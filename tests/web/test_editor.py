@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext
+from playwright.sync_api import BrowserContext
 
 from tests.serving import Server
 from tests.web.conftest import Editor, MortalServer
@@ -143,11 +143,9 @@ def test_the_camera_obeys_mouse_and_keys(editor: Editor) -> None:
     editor.wait("the first view", lambda: not editor.differs(first))
 
 
-def test_fingers_pinch_and_drag(browser: Browser, server: Server) -> None:
-    phone = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    editor = Editor(phone.new_page())
-    editor.open(server.url)
-    session = phone.new_cdp_session(editor.page)
+def test_fingers_pinch_and_drag(visit: Callable[..., Editor]) -> None:
+    editor = visit((390, 844), scale=1, touch=True)
+    session = editor.page.context.new_cdp_session(editor.page)
     x, y = middle(editor)
 
     def touch(kind: str, *points: tuple[float, float]) -> None:
@@ -164,7 +162,6 @@ def test_fingers_pinch_and_drag(browser: Browser, server: Server) -> None:
     touch("touchMove", (x - 60, y), (x + 60, y))
     touch("touchEnd")
     editor.wait_for_change(before)
-    phone.close()
 
 
 def test_pause_stops_the_samples(editor: Editor) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, WebSocketRoute
+from playwright.sync_api import Browser, WebSocketRoute
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
@@ -32,9 +32,8 @@ def findings(editor: Editor) -> list[str]:
 
 
 @pytest.mark.parametrize("scheme", seldom(["dark", "light"], ["light"]))
-def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any) -> None:
-    editor = Editor(browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme))
-    editor.open(server.url)
+def test_axe_finds_nothing_serious(visit: Callable[..., Editor], scheme: Any) -> None:
+    editor = visit((1280, 800), scale=1, color_scheme=scheme)
     for tab in ("scene", "film", "render", "view", "save", "material"):
         editor.tab(tab)
         assert findings(editor) == [], tab
@@ -65,14 +64,12 @@ def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any
     assert findings(editor) == []
     editor.page.keyboard.press("?")
     assert findings(editor) == []
-    editor.page.close()
 
 
 @pytest.mark.parametrize("size", [(390, 844), (640, 400), (844, 390), (1280, 800), (1920, 1080)])
-def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, int]) -> None:
+def test_nothing_is_cut_off(visit: Callable[..., Editor], size: tuple[int, int]) -> None:
     """Among them a phone both ways, and a laptop at 200 %."""
-    editor = Editor(browser.new_page(viewport={"width": size[0], "height": size[1]}))
-    editor.open(server.url)
+    editor = visit(size, scale=1)
     for tab in ("film", "scene", "render", "save", "material"):
         editor.tab(tab)
         script = """() => [...document.querySelectorAll("button, input, select, [role=option]")]
@@ -87,7 +84,6 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
     box = editor.page.locator("#stage").bounding_box()
     assert box is not None and box["width"] * box["height"] > 0.2 * size[0] * size[1], "the picture has room"
     assert editor.page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    editor.page.close()
 
 
 SMALL = """() => {
@@ -113,18 +109,15 @@ SMALL = """() => {
 
 
 @pytest.mark.parametrize("size", [(390, 844, True), (844, 390, True), (1024, 768, False), (720, 450, False)])
-def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, size: tuple[int, int, bool]) -> None:
+def test_letters_can_be_read_and_fingers_hit(visit: Callable[..., Editor], size: tuple[int, int, bool]) -> None:
     """A phone both ways, a tablet's size, and a laptop at 200 %."""
     width, height, touch = size
-    page = browser.new_page(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
-    page.goto(server.url + "/#scene=sphere-on-floor")
-    page.wait_for_selector("#material-form [data-field]")
+    editor = visit((width, height), scale=1, touch=touch)
+    page = editor.page
     page.click("#compare")
-    editor = Editor(page)
     for tab in ("film", "scene", "render", "view", "save", "material"):
         editor.tab(tab)
         assert page.evaluate(SMALL) == [], tab
-    page.close()
 
 
 def test_the_keyboard_reaches_everything(editor: Editor) -> None:
@@ -170,10 +163,8 @@ def test_live_regions_do_not_chatter(editor: Editor) -> None:
     assert editor.page.get_attribute("#announcer", "role") == "status"
 
 
-def test_motion_and_theme(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
-    editor.page.emulate_media(reduced_motion="reduce", color_scheme="dark")
-    editor.open(server.url)
+def test_motion_and_theme(visit: Callable[..., Editor]) -> None:
+    editor = visit(reduced_motion="reduce", color_scheme="dark")
     style = "getComputedStyle(document.getElementById('outline')).transitionDuration"
     assert editor.page.evaluate(style) == "0s"
     panel = "getComputedStyle(document.getElementById('panel')).backgroundColor"
@@ -219,8 +210,8 @@ def test_a_key_is_asked_for_and_a_full_server_waited_out(strict: Server, browser
     second.page.close()
 
 
-def test_a_cut_connection_takes_its_session_up_again(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
+def test_a_cut_connection_takes_its_session_up_again(blank: Editor, server: Server) -> None:
+    editor = blank
     editor.page.add_init_script("""
         window.sockets = [];
         window.WebSocket = class extends WebSocket {
@@ -237,8 +228,8 @@ def test_a_cut_connection_takes_its_session_up_again(context: BrowserContext, se
     assert editor.page.evaluate("window.sockets.length") == 2
 
 
-def test_a_session_that_another_tab_took_goes_on_when_asked(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
+def test_a_session_that_another_tab_took_goes_on_when_asked(blank: Editor, server: Server) -> None:
+    editor = blank
     greetings: list[str] = []
 
     def listen(data: str | bytes) -> None:
@@ -259,8 +250,8 @@ def test_a_session_that_another_tab_took_goes_on_when_asked(context: BrowserCont
     editor.settled()
 
 
-def test_a_lost_renderer_is_told_and_waited_for(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
+def test_a_lost_renderer_is_told_and_waited_for(blank: Editor, server: Server) -> None:
+    editor = blank
     routes: list[WebSocketRoute] = []
 
     def pass_on(route: WebSocketRoute) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext, Page, WebSocketRoute
+from playwright.sync_api import Page, WebSocketRoute
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -44,8 +43,10 @@ class Held:
 
 
 @pytest.fixture
-def held(editor: Editor) -> Iterator[Held]:
-    yield Held(editor.page)
+def held(blank: Editor, server: Server) -> Held:
+    """Of a page that shows its first picture."""
+    blank.open(server.url)
+    return Held(blank.page)
 
 
 def visit(editor: Editor, url: str) -> None:
@@ -56,9 +57,9 @@ def visit(editor: Editor, url: str) -> None:
 
 
 def test_the_last_picture_of_a_scene_stands_until_the_next_is_there(
-    editor: Editor, held: Held, server: Server
+    blank: Editor, held: Held, server: Server
 ) -> None:
-    page = editor.page
+    editor, page = blank, blank.page
     last, label, scene = "#last-picture", "#preparing", f"{server.url}/#scene=sphere-on-floor"
     editor.wait("a picture to be kept", lambda: page.evaluate(KEPT, "sphere-on-floor") == "")
     held.isHolding = True
@@ -89,8 +90,8 @@ def test_the_last_picture_of_a_scene_stands_until_the_next_is_there(
     assert editor.complaints == []
 
 
-def test_what_is_being_prepared_says_how_long_that_may_take(editor: Editor, held: Held) -> None:
-    page = editor.page
+def test_what_is_being_prepared_says_how_long_that_may_take(blank: Editor, held: Held) -> None:
+    editor, page = blank, blank.page
     page.evaluate("localStorage['sunbox.preparing'] = JSON.stringify({ scene: [1, 400, 500, 600], change: [50] })")
     held.isHolding = True
     visit(editor, page.url)
@@ -104,14 +105,12 @@ def test_what_is_being_prepared_says_how_long_that_may_take(editor: Editor, held
     assert seconds <= kept["scene"][-1] < 400 and kept["change"] == [50], "it is remembered for the next time"
 
 
-def test_a_hint_says_what_can_be_dropped_until_something_was(
-    editor: Editor, context: BrowserContext, server: Server
-) -> None:
+def test_a_hint_says_what_can_be_dropped_until_something_was(editor: Editor, server: Server) -> None:
     page = editor.page
     assert editor.text("#hint").startswith("Drop a model, an environment, a texture")
     editor.drop("#stage", {"halves.png": halves()})
     assert page.is_hidden("#hint")
-    second = Editor(context.new_page())
+    second = Editor(page.context.new_page())
     second.open(server.url)
     assert second.page.is_hidden("#hint"), "for good"
     second.page.evaluate("localStorage.removeItem('sunbox.ui')")

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
 from service.scene.transform import Transform
-from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.editing import document
 from tests.web.modules import call
@@ -113,14 +111,6 @@ def test_arrow_keys_change_the_selection_by_steps(editor: Editor) -> None:
     page.keyboard.press("Shift+ArrowLeft")
     assert document(editor)["environment"]["rotation"] == -10
     assert page.locator("#handles [data-handle]").count() == 1, "about the vertical alone"
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser, server: Server) -> Iterator[Page]:
-    opened = browser.new_page()
-    opened.goto(server.url + "/icon.svg")
-    yield opened
-    opened.close()
 
 
 def drags(page: Page, kind: str, arguments: list[Any], places: list[list[float]]) -> list[Any]:

@@ -7,16 +7,13 @@ way to where it is done are bounded by themselves.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser
 
-from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.editing import document
 
@@ -151,13 +148,10 @@ class Keys:
 
 
 @pytest.fixture
-def wide(browser: Browser, server: Server) -> Iterator[Editor]:
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=0.3)
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
-    opened = Editor(context.new_page())
-    opened.open(server.url)
-    yield opened
-    context.close()
+def wide(visit: Callable[..., Editor]) -> Editor:
+    opened = visit((1440, 900))
+    opened.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    return opened
 
 
 @pytest.fixture(params=[Mouse, Keys], ids=["mouse", "keys"])
@@ -248,11 +242,8 @@ def test_a_product_is_lit_with_two_lamps(hand: Hand) -> None:
     assert hand.actions <= 6, "it was not possible in the picture, and took 14 for a light beside it"
 
 
-def test_a_phone_gives_a_thing_copper_and_saves_its_picture(browser: Browser, server: Server, tmp_path: Path) -> None:
-    options = {"width": 390, "height": 844}
-    context = browser.new_context(viewport=options, has_touch=True, is_mobile=True)
-    editor = Editor(context.new_page())
-    editor.open(server.url)
+def test_a_phone_gives_a_thing_copper_and_saves_its_picture(visit: Callable[..., Editor]) -> None:
+    editor = visit((390, 844), scale=1, touch=True)
     page = editor.page
     actions = 0
     page.tap("#search-library")
@@ -262,7 +253,7 @@ def test_a_phone_gives_a_thing_copper_and_saves_its_picture(browser: Browser, se
     actions += 3
     rough = page.locator(f"{field('roughness')} input[type=range]")
     box = rough.bounding_box()
-    assert box and box["y"] + box["height"] <= options["height"], "in sight without scrolling"
+    assert box and box["y"] + box["height"] <= 844, "in sight without scrolling"
     before = rough.input_value()
     page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2)
     editor.wait("its roughness", lambda: rough.input_value() != before)
@@ -281,4 +272,3 @@ def test_a_phone_gives_a_thing_copper_and_saves_its_picture(browser: Browser, se
             actions += 1
     assert waiting.value.path().read_bytes().startswith(b"\x89PNG")
     assert actions < 9
-    context.close()

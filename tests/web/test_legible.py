@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.serving import Server
 from tests.web.conftest import Editor
 
 Size = tuple[int, int, bool]
@@ -36,14 +34,10 @@ CUT = """() => [...document.querySelectorAll("input.entry")]
 
 
 @pytest.fixture
-def at(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iterator[Editor]:
+def at(visit: Callable[..., Editor], request: pytest.FixtureRequest) -> Editor:
     """The editor in a window of the size that a test names."""
     width, height, touch = request.param
-    context = browser.new_context(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
-    opened = Editor(context.new_page())
-    opened.open(server.url)
-    yield opened
-    context.close()
+    return visit((width, height), scale=1, touch=touch)
 
 
 def paste(editor: Editor, document: dict[str, Any]) -> None:

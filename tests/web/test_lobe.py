@@ -7,7 +7,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageOutput, ImageSpec
 from PIL import Image
-from playwright.sync_api import Browser, Route
+from playwright.sync_api import Route
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -362,12 +362,8 @@ def test_an_old_plot_is_dimmed_until_the_new_one_is_there(lobe: Editor) -> None:
 
 
 @pytest.fixture
-def phone(browser: Browser, server: Server) -> Iterator[Editor]:
-    opened = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    editor = Editor(opened.new_page())
-    editor.open(server.url)
-    yield editor
-    opened.close()
+def phone(visit: Callable[..., Editor]) -> Editor:
+    return visit((390, 844), scale=1, touch=True)
 
 
 def test_a_phone_shows_the_lobe_in_the_pictures_place(phone: Editor) -> None:

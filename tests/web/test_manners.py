@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext, WebSocket
+from playwright.sync_api import WebSocket
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -37,11 +37,10 @@ class Wire:
 
 
 @pytest.fixture
-def wire(server: Server, context: BrowserContext) -> tuple[Editor, Wire]:
-    editor = Editor(context.new_page())
-    wire = Wire(editor)
-    editor.open(server.url)
-    return editor, wire
+def wire(server: Server, blank: Editor) -> tuple[Editor, Wire]:
+    wire = Wire(blank)
+    blank.open(server.url)
+    return blank, wire
 
 
 def test_a_drag_is_one_small_update_at_a_time(wire: tuple[Editor, Wire]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from playwright.sync_api import BrowserContext, Route, WebSocketRoute
+from playwright.sync_api import Route, WebSocketRoute
 
 from tests.serving import Server
 from tests.web.conftest import Editor
@@ -51,9 +51,8 @@ def test_no_answer_is_told_in_words(editor: Editor) -> None:
     editor.wait("the end of the words", lambda: editor.text("#messages") == "")
 
 
-def test_the_old_scene_is_not_taken_for_the_new_one(context: BrowserContext, server: Server) -> None:
-    editor = Editor(context.new_page())
-    page = editor.page
+def test_the_old_scene_is_not_taken_for_the_new_one(blank: Editor, server: Server) -> None:
+    editor, page = blank, blank.page
     held: list[Any] | None = None
     routes: list[WebSocketRoute] = []
 

@@ -12,11 +12,10 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from PIL import Image
-from playwright.sync_api import BrowserContext
 
 from service.images import read_metadata
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.conftest import WINDOW, Editor
 from tests.web.editing import TRIANGLE, finish, overlay
 
 
@@ -89,7 +88,7 @@ def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, serve
     editor.wait("a texture", lambda: editor.page.is_visible("[data-field=base_color] .texture"))
 
 
-def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: BrowserContext) -> None:
+def test_a_link_and_the_browser_bring_the_view_back(editor: Editor) -> None:
     before = editor.settled()
     editor.page.click("#library [data-value=gold]")
     editor.page.keyboard.press("ArrowLeft")
@@ -100,7 +99,7 @@ def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: Bro
     editor.wait("the link", lambda: "#v=" in editor.page.input_value(".command"))
     link = editor.page.input_value(".command")
 
-    stranger = Editor(context.browser.new_page(viewport={"width": 800, "height": 560}))  # type: ignore[union-attr]
+    stranger = Editor(editor.page.context.browser.new_page(viewport=WINDOW))  # type: ignore[union-attr]
     stranger.page.goto(link)
     stranger.wait("a picture", lambda: stranger.samples() >= 4)
     stranger.settled()
@@ -186,7 +185,9 @@ def test_any_name_can_be_saved_and_is_not_lost_by_accident(editor: Editor, serve
     )
 
 
-def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server: Server) -> None:
+def test_two_tabs_keep_two_works(editor: Editor, server: Server) -> None:
+    context = editor.page.context
+
     def kept(tab: Editor) -> object:
         return tab.page.evaluate(
             "JSON.parse(localStorage['sunbox.work ' + sessionStorage['sunbox.tab']] ?? 'null')"

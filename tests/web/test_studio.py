@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext
 
-from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.editing import document
 
@@ -19,15 +17,11 @@ FOCUSED = "(document.activeElement.getAttribute('role') ?? document.activeElemen
 
 
 @pytest.fixture
-def at(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iterator[Editor]:
+def at(visit: Callable[..., Editor], request: pytest.FixtureRequest) -> Editor:
     """The editor in a window of the size that a test names."""
     width, height, *more = request.param
     options: dict[str, Any] = more[0] if more else {}
-    context = browser.new_context(viewport={"width": width, "height": height}, **options)
-    opened = Editor(context.new_page())
-    opened.open(server.url)
-    yield opened
-    context.close()
+    return visit((width, height), scale=1, **options)
 
 
 def names(editor: Editor, listbox: str) -> list[str]:
@@ -192,7 +186,7 @@ def test_the_inspector_is_as_wide_as_one_likes(editor: Editor) -> None:
     editor.wait("the same", lambda: splitter.get_attribute("aria-valuenow") == "520")
 
 
-@pytest.mark.parametrize("at", [(390, 844, {"has_touch": True, "is_mobile": True})], indirect=True)
+@pytest.mark.parametrize("at", [(390, 844, {"touch": True})], indirect=True)
 def test_a_phone_has_colour_and_roughness_on_its_first_screen(at: Editor) -> None:
     page = at.page
     tops = []
@@ -203,7 +197,7 @@ def test_a_phone_has_colour_and_roughness_on_its_first_screen(at: Editor) -> Non
     assert tops == sorted(tops)
 
 
-PHONE = {"has_touch": True, "is_mobile": True}
+PHONE = {"touch": True}
 
 
 @pytest.mark.parametrize("at", [(390, 844, PHONE), (320, 640, PHONE)], indirect=True)
@@ -276,10 +270,8 @@ def test_forced_colours_show_sliders_and_choices(at: Editor) -> None:
         assert np.abs(a - b).sum() > 100, chosen
 
 
-def test_no_list_grows_with_what_is_looked_at(context: BrowserContext, server: Server) -> None:
+def test_no_list_grows_with_what_is_looked_at(editor: Editor) -> None:
     """The options of materials that went with their scene are dropped."""
-    editor = Editor(context.new_page())
-    editor.open(server.url)
     for scene in ("cornell-boxes", "point-lights", "sphere-on-floor"):
         editor.pick("scenes", scene)
         editor.wait("the scene", lambda name=scene: editor.chosen("scenes") == name)

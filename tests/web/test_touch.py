@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.serving import Server
 from tests.web.conftest import Editor
 
 Swipe = Callable[[str, float, float], None]
 
 
 @pytest.fixture
-def phone(browser: Browser, server: Server) -> Iterator[tuple[Editor, Swipe]]:
+def phone(visit: Callable[..., Editor]) -> tuple[Editor, Swipe]:
     """The editor on a phone, and swipe(selector, right, down): a finger that begins near the right end of a thing."""
-    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    editor = Editor(context.new_page())
-    editor.open(server.url)
-    session = context.new_cdp_session(editor.page)
+    editor = visit((390, 844), scale=1, touch=True)
+    session = editor.page.context.new_cdp_session(editor.page)
 
     def swipe(selector: str, right: float, down: float) -> None:
         box = editor.page.locator(selector).bounding_box()
@@ -33,8 +29,7 @@ def phone(browser: Browser, server: Server) -> Iterator[tuple[Editor, Swipe]]:
         session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
         editor.page.wait_for_timeout(200)
 
-    yield editor, swipe
-    context.close()
+    return editor, swipe
 
 
 def test_a_finger_that_scrolls_the_panel_moves_no_slider(phone: tuple[Editor, Swipe]) -> None:
