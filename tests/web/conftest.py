@@ -26,6 +26,22 @@ MENUS = {"save": ("#scene-menu", "#page-save"), "view": ("#view", "#view-menu")}
 ELSEWHERE = "/icon.svg"  # a page of the same origin, in which no editor runs
 WINDOW: ViewportSize = {"width": 800, "height": 560}
 COARSE = 0.5  # a pixel of the picture for four of the page: all waits for samples are a quarter as long
+# Whether something comes to hold within some seconds: asked in the page, that costs next to nothing.
+SOON = """async (holds) => {
+    const find = (selector) => document.querySelector(selector);
+    const samples = () => parseInt(find("#samples")?.innerText.split("/")[0].replace(/\\D/g, "") || "0");
+    const tests = {
+        opened: () => samples() >= 1 && performance.getEntriesByName("all parts").length > 0,
+        settled: () => find("#stage[aria-busy=false]") && !find("#preview").checkVisibility()
+            && (samples() >= 8 || find("#state").innerText === "Done"),
+    };
+    for (let i = 0; i < 200; i++) {
+        if (tests[holds]()) return true;
+        await new Promise((resolve) => setTimeout(resolve, 25));
+    }
+    return false;
+}"""
+OPENED, SETTLED = "opened", "settled"
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 
@@ -151,16 +167,15 @@ class Editor:
     def open(self, url: str, scene: str = "#scene=sphere-on-floor") -> None:
         """With a scene that is quicker than the first one; "" goes on with what was left."""
         self.page.goto(f"{url}/{scene}")
-        self.wait("a picture", lambda: self.samples() >= 1)
-        parts = "performance.getEntriesByName('all parts').length"
-        self.wait("what comes after the picture", lambda: self.page.evaluate(parts))
+        self.wait("a picture and what comes after it", lambda: self.page.evaluate(SOON, OPENED))
 
     def wait(self, what: str, reached: Callable[[], object]) -> None:
-        deadline = time.monotonic() + PATIENCE_S
+        deadline, pause_ms = time.monotonic() + PATIENCE_S, 20.0
         while not reached():
             if time.monotonic() > deadline:
                 pytest.fail(f"waited in vain for {what}; page says: {self.complaints}, {self.text('#messages')!r}")
-            self.page.wait_for_timeout(30)
+            self.page.wait_for_timeout(pause_ms)
+            pause_ms = min(1.2 * pause_ms, 100)  # a look takes 10 ms of a processor, which the picture waits for
 
     def rest(self, what: str, reading: Callable[[], object]) -> None:
         """Return when a reading has stayed the same for half a second: what was under way has come by then."""
@@ -189,9 +204,6 @@ class Editor:
         digits = "".join(filter(str.isdigit, self.text("#samples").split("/")[0]))
         return int(digits or 0)
 
-    def is_clean(self) -> bool:
-        return self.samples() >= 8 or self.text("#state") == "Done"
-
     def pixels(self) -> list[float]:
         """The canvas in 8x8 averages of red, green and blue: too coarse for noise to count."""
         values: list[float] = self.page.evaluate("""() => {
@@ -204,11 +216,7 @@ class Editor:
 
     def settled(self) -> list[float]:
         """The pixels after enough samples at full size that neither noise nor a guess is a reason to differ."""
-        ready = "#stage[aria-busy=false]"
-        self.wait(
-            "a settled picture",
-            lambda: self.page.query_selector(ready) and self.page.is_hidden("#preview") and self.is_clean(),
-        )
+        self.wait("a settled picture", lambda: self.page.evaluate(SOON, SETTLED))
         return self.pixels()
 
     def differs(self, before: list[float], least: float = 4.0) -> bool:
