@@ -13,11 +13,13 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, ViewportSize, sync_playwright
 
 from gpu import Renderer
+from service.storage.documents import KINDS
 from tests.serving import Server
 
 # The headless shell is the same engine without the window around it, and opens a page at half the cost.
@@ -374,9 +376,15 @@ class Room:
         for other in self.context.pages:
             if other is not self.page:
                 other.close()
-        if self.page.is_closed():
+        try:
+            self._leave()
+        except Error:  # it was closed, or has crashed
+            self.page.close()
             self._heard.clear()
             self.page = self._enter()
+            self._leave()
+
+    def _leave(self) -> None:
         for event, hear in self._heard:
             self.page.remove_listener(event, hear)
         self._heard.clear()
@@ -415,9 +423,9 @@ def _rooms(browser: Browser, server: Server) -> Iterator[Callable[..., Room]]:
 
 
 @pytest.fixture
-def enter(_rooms: Callable[..., Room]) -> Iterator[Callable[..., Room]]:
-    """enter(scale, touch): a room, empty until the end of the test, whose screen has so many pixels for one of the
-    page, and fingers on it or none."""
+def enter(_rooms: Callable[..., Room], server: Server) -> Iterator[Callable[..., Room]]:
+    """enter(scale, touch): a room until the end of the test, whose screen has so many pixels for one of the page, and
+    fingers on it or none. Of what was saved on the server by name nothing is left after it."""
     used: dict[int, Room] = {}
 
     def room(scale: float = COARSE, touch: bool = False) -> Room:
@@ -428,6 +436,9 @@ def enter(_rooms: Callable[..., Room]) -> Iterator[Callable[..., Room]]:
     yield room
     for each in used.values():
         each.forget()
+    for kind in KINDS if used else ():
+        for saved in server.http.get(f"/v1/documents/{kind}").json():
+            server.http.delete(f"/v1/documents/{kind}/{quote(saved['name'], safe='')}")
 
 
 @pytest.fixture
