@@ -286,6 +286,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 async def _warm(app: FastAPI) -> None:
     """Render a first frame, repeat the address below what was logged meanwhile, and prepare for changes of scene."""
     state: AppState = app.state.sunbox
+    if state.config.ahead == "off":
+        return
     if not await warm_up(state.renderers, state.reader, presets.get("scenes", presets.DEFAULT_SCENE)):
         return
     _announce(state.address)

@@ -36,6 +36,7 @@ NUMBER = re.compile(r"[0-9]{1,6}")
 
 ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
 
+Ahead = Literal["off", "some", "all"]  # kernels that are compiled before anybody waits for them
 Words = Annotated[list[str], NoDecode]
 # Fields whose variables are lists, separated by commas.
 WORDS = (
@@ -180,6 +181,11 @@ class Config(BaseSettings):
         ge=1,
         description="Most bytes of scenes and pictures on each device; the renderers of `llvmpipe:N` divide them "
         "(default: 80 % of a GPU's, where its driver tells; `SUNBOX_MEMORY` for software renderers).",
+    )
+    ahead: Ahead = Field(
+        "some",
+        description="Which kernels are compiled before anybody waits for them: `off`, none; `some`, those of the "
+        "built-in scenes and those that the next edit may need; `all` is `some` for now.",
     )
     hang_s: Seconds = Field(
         10.0,

@@ -19,7 +19,7 @@ from tests import kernel_count
 from tests.families import FamilyRenderer
 from tests.privileges import shed
 from tests.rendering import release_pictures
-from tests.serving import Server
+from tests.serving import AHEAD, Server
 
 TESTS = Path(__file__).parent
 # The files that take longest, in this order: begun last, one of them would leave a core without work.
@@ -34,6 +34,9 @@ LONG_FILES = (
     "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "service/test_rest.py",
     "shaders/test_lobes.py", "service/bench/test_device.py", "service/rendering/test_checkpoints.py",
 )  # fmt: skip
+
+# Files whose tests wait for kernels that are compiled before anybody waits for them.
+COMPILED_AHEAD = ("gpu/test_foreseen.py", "gpu/test_fallback.py")
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -58,6 +61,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    os.environ[AHEAD] = "off"  # else each renderer that is started compiles for a minute what no test asks for
     folder = tempfile.TemporaryDirectory(prefix="sunbox-tests-")
     config.add_cleanup(folder.cleanup)
     shed(Path(folder.name))
@@ -123,6 +127,13 @@ def gpu() -> Iterator[FamilyRenderer]:
         pytest.skip(str(error))
     yield renderer
     renderer.close()
+
+
+@pytest.fixture(autouse=True)
+def _ahead(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have kernels compiled ahead in the tests of just that."""
+    if request.path in (TESTS / name for name in COMPILED_AHEAD):
+        monkeypatch.setenv(AHEAD, "some")
 
 
 @pytest.fixture(autouse=True)

@@ -21,6 +21,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 COLD_S = 150.0  # caches are empty: every kernel is compiled
+AHEAD = "SUNBOX_AHEAD"  # the setting that tests turn off, but those of what is compiled ahead
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 SCENE: dict[str, Any] = {
@@ -52,15 +53,14 @@ def wait_until(reached: Callable[[], object], pause_s: float = 0.02) -> None:
 
 
 class Server:
-    """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one; with
-    `warms` set to False it does nothing ahead of its first client."""
+    """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one. What is
+    compiled ahead is the session's (`AHEAD`), and all other settings are its own."""
 
-    def __init__(self, folder: Path, *, python: Sequence[str] = (), warms: bool = True, **variables: str) -> None:
+    def __init__(self, folder: Path, *, python: Sequence[str] = (), **variables: str) -> None:
         self.log = folder / "server.log"
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
-        environment |= {"SUNBOX_DATA_DIR": str(folder / "data"), **variables}
-        program = "service.cli" if warms else "tests.unwarmed"
-        command = [*(python or [sys.executable]), "-m", program, "serve", "--port", "0"]
+        environment |= {AHEAD: os.environ[AHEAD], "SUNBOX_DATA_DIR": str(folder / "data"), **variables}
+        command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
         assert self.process.stdout is not None

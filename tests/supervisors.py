@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
 from tests.documents import Shelf
-from tests.serving import PATIENCE_S, SCENE
+from tests.serving import AHEAD, PATIENCE_S, SCENE
 
 SIZE = {"width": 32, "height": 32}
 ENDLESS = StopRule()
@@ -65,9 +66,14 @@ class Ears:
                 return message
 
 
+def renderer_options(**given: Any) -> Options:
+    """Options of a renderer's process, which compiles ahead what the session's servers do unless `ahead` is given."""
+    return Options(**{"ahead": os.environ[AHEAD], **given})
+
+
 def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], checkpoint_s: float = 2.0, **options: Any) -> None:
     async def run() -> None:
-        supervisor = Supervisor(Options(checkpoint_s=checkpoint_s, **options))
+        supervisor = Supervisor(renderer_options(checkpoint_s=checkpoint_s, **options))
         supervisor.start()
         try:
             await supervisor.ready(PATIENCE_S)
@@ -87,14 +93,14 @@ def arrays_of(name: str) -> Any:
     return pack(parse_scene(SCENES[name]), Shelf()).arrays
 
 
-def compile_helpers(parent: int | None) -> list[int]:
-    """Ids of the processes of `parent` that compile what somebody waits for."""
+def compile_helpers(parent: int | None, priority: str = "now") -> list[int]:
+    """Ids of the processes of `parent` that compile with that priority: `now` is what somebody waits for."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
         try:
             of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
             command = (path / "cmdline").read_bytes()
-            if of == parent and b"compile_main" in command and b"--priority\0now" in command:
+            if of == parent and b"compile_main" in command and b"--priority\0" + priority.encode() in command:
                 found.append(int(path.name))
         except OSError:
             continue

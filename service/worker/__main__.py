@@ -32,6 +32,7 @@ def main() -> int:
     parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
     parser.add_argument("--host-memory", type=int, help="the same where the device's memory is the machine's")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
+    parser.add_argument("--ahead", required=True, help="which kernels nobody has to wait for: off, some or all")
     parser.add_argument("--device", type=int)
     parser.add_argument("--software", action="store_true", help="on the processor, whatever its device's number is")
     parser.add_argument("--name", default="0", help="the renderer's id, for the log")
@@ -81,8 +82,8 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
             "the processor renders, as this user may not use the GPU",
             {"device": closed[0], "group": closed[0].group()},
         )
-    heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
-    Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline).run()
+    heartbeat, lifeline, foresees = Heartbeat(arguments.heartbeat), arguments.lifeline, arguments.ahead != "off"
+    Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline, foresees).run()
     return 0
 
 

@@ -27,6 +27,8 @@ class ForeseenKernels:
 
     def prepare(self, idle: bool) -> bool:
         """Queue one kernel for each priority that has none; whether there was one. `idle`: nothing is traced."""
+        if not self._compiler.foresees:
+            return False
         handed = False
         scenes = self._scenes or (self._sliders if idle else None)
         if scenes and self._compiler.is_idle("soon"):

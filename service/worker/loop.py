@@ -58,7 +58,9 @@ class Loop:
         device: int | None,
         checkpoint_s: float,
         lifeline: int | None = None,
+        foresees: bool = True,
     ) -> None:
+        """`foresees`: kernels are compiled before anybody waits for them."""
         self._end = end
         self._renderer = renderer
         self._heartbeat = heartbeat
@@ -72,7 +74,7 @@ class Loop:
         )
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
-        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline)
+        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline, foresees)
         self._context = WorkerContext(
             renderer,
             self._send,

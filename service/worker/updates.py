@@ -99,7 +99,7 @@ class Updates:
 
     def foresee(self, settings: RenderSettings) -> None:
         """Have compiled what moving a large mesh would need, and the first touch of some sliders."""
-        if self._compiler is not None and self._tracker.interactive:
+        if self._compiler is not None and self._compiler.foresees and self._tracker.interactive:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
             first = self.preview.prepare(arrays, settings)  # with which any of them can be shown

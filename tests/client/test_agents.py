@@ -298,7 +298,7 @@ def test_names_in_documents_stay_quoted(agent: Agent) -> None:
 
 def test_saved_scenes_belong_to_their_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The key comes from the environment."""
-    with served(tmp_path, warms=False, SUNBOX_API_KEY="anna,bert") as keyed:
+    with served(tmp_path, SUNBOX_API_KEY="anna,bert") as keyed:
         monkeypatch.setenv("SUNBOX_API_KEY", "anna")
         agent = Agent(keyed.url)
         try:

@@ -79,7 +79,7 @@ def _fill(folder: Path) -> None:
     """Documents and an asset without an owner, and an owner's renders: one gone, which a key still names, one done,
     one cancelled, one failed, one under way with a checkpoint, and one that waits; and a batch whose first renders
     wait."""
-    first = Server(folder, warms=False)
+    first = Server(folder)
     asset = first.http.post("/v1/assets", content=OBJ).raise_for_status().json()["id"]
     clay = {"type": "diffuse", "albedo": 0.6}
     scene = {
@@ -96,7 +96,7 @@ def _fill(folder: Path) -> None:
 
     def started() -> Server:
         limits = {"SUNBOX_MAX_RUNNING": "1", "SUNBOX_KEEP_RENDERS": "3", "SUNBOX_CHECKPOINT_S": "0.1"}
-        server = Server(folder, warms=False, SUNBOX_API_KEY="anna", **limits)
+        server = Server(folder, SUNBOX_API_KEY="anna", **limits)
         server.http.headers.update(KEY)
         return server
 

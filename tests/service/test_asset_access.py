@@ -78,7 +78,7 @@ def test_the_parts_of_a_scene_are_its_owner_s_also_where_they_are_made_again(kep
 
 @pytest.fixture(scope="module")
 def keyed(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    served = Server(tmp_path_factory.mktemp("keyed"), warms=False, SUNBOX_API_KEY="anna,bert")
+    served = Server(tmp_path_factory.mktemp("keyed"), SUNBOX_API_KEY="anna,bert")
     yield served
     assert served.stop() == 0
 

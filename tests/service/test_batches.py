@@ -154,7 +154,7 @@ def test_an_idempotency_key_starts_one_batch(server: Server) -> None:
 
 def test_a_restart_goes_on(tmp_path: Path) -> None:
     """After a kill, with one render at a time; what was done stays, and the data folder is sound."""
-    first = Server(tmp_path, warms=False, SUNBOX_MAX_RUNNING="1", SUNBOX_MAX_PIXELS="4000")
+    first = Server(tmp_path, SUNBOX_MAX_RUNNING="1", SUNBOX_MAX_PIXELS="4000")
     id = started(first, [{"turntable": 5, "degrees": 90}], {**SMALL, "max_samples": 512})
     gone = started(first, [ROUGHNESS], ENDLESS)
     wait_until(lambda: status(first, id)["counts"]["done"] >= 2)
@@ -165,7 +165,7 @@ def test_a_restart_goes_on(tmp_path: Path) -> None:
     kill(first)
     with closing(sqlite3.connect(tmp_path / "data" / FILE)) as database, database:  # between that and its renders
         database.execute("UPDATE batches SET cancelled = 1 WHERE id = ?", (cut,))
-    with served(tmp_path, warms=False, SUNBOX_MAX_RUNNING="1") as second:
+    with served(tmp_path, SUNBOX_MAX_RUNNING="1") as second:
         found = status(second, id, 60)
         assert found["state"] == "done" and found["counts"]["done"] == 5
         assert all(np.array_equal(picture, pixels(second, render)) for render, picture in before.items())

@@ -45,7 +45,7 @@ def calling(tmp_path_factory: pytest.TempPathFactory, listening: Receiver) -> It
     """A server that may call `listening`, and signs with two secrets."""
     folder = tmp_path_factory.mktemp("calling")
     hosts, secrets = f"{listening.url},http://localhost:{listening.port}", f"{SECRET},{OTHER}"
-    with served(folder, warms=False, SUNBOX_CALLBACK_HOSTS=hosts, SUNBOX_CALLBACK_SECRET=secrets) as server:
+    with served(folder, SUNBOX_CALLBACK_HOSTS=hosts, SUNBOX_CALLBACK_SECRET=secrets) as server:
         yield server
 
 
@@ -172,13 +172,13 @@ def test_callbacks_outlive_the_server(tmp_path: Path, receiver: Receiver) -> Non
     """One is due again when the server is killed, and the render of another one goes on."""
     receiver.answer = lambda heard: 503
     hosts = {"SUNBOX_CALLBACK_HOSTS": receiver.url}
-    first = Server(tmp_path, warms=False, **hosts)
+    first = Server(tmp_path, **hosts)
     first.wait()
     due, waiting = started(first, receiver.url), started(first, receiver.url, settings=ENDLESS)
     wait_until(lambda: listed(first, due)["attempts"])
     kill(first)
     receiver.answer = lambda heard: 204
-    with served(tmp_path, warms=False, **hosts) as second:
+    with served(tmp_path, **hosts) as second:
         wait_until(lambda: listed(second, due)["state"] == "delivered")
         second.http.delete(f"/v1/renders/{waiting}").raise_for_status()
         wait_until(lambda: listed(second, waiting)["state"] == "delivered")

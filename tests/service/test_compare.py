@@ -253,7 +253,7 @@ def test_a_time_limit_ends_it(http: httpx.Client) -> None:
 
 
 def test_going_away_ends_the_work(tmp_path: Path) -> None:
-    with served(tmp_path, warms=False) as server:
+    with served(tmp_path) as server:
         sides = [document(samples=2**24, sampler=each) for each in ("sobol", "independent")]
 
         def under_way() -> float:

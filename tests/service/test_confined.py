@@ -251,7 +251,7 @@ def read_by_another(pid: int, name: str) -> str:
 def test_no_process_beside_the_server_has_its_keys(tmp_path: Path, server: Server) -> None:
     """A renderer, whose driver nothing confines, and the denoiser that it starts: other processes of this user read
     neither their memory nor their environment, and root finds no key there."""
-    keyed = Server(tmp_path, warms=False, SUNBOX_API_KEY="very-secret", SUNBOX_APIKEY="misspelt-secret")
+    keyed = Server(tmp_path, SUNBOX_API_KEY="very-secret", SUNBOX_APIKEY="misspelt-secret")
     try:
         keyed.wait()
         order = {"scene": SCENE, "settings": {**SMALL, "denoise": True}}

@@ -47,7 +47,7 @@ def keyed(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         "SUNBOX_MAX_SECONDS": "5",
         "SUNBOX_ALLOWED_ORIGINS": "https://friend.example",
     }
-    served = Server(tmp_path_factory.mktemp("keyed"), warms=False, **variables)
+    served = Server(tmp_path_factory.mktemp("keyed"), **variables)
     served.wait()
     yield served
     assert served.stop() == 0
@@ -169,7 +169,7 @@ def test_a_body_that_stops_is_ended(keyed: Server) -> None:
 
 
 def test_the_disk_has_its_quota(tmp_path: Path) -> None:
-    served = Server(tmp_path, warms=False, SUNBOX_DATA_QUOTA="200000")
+    served = Server(tmp_path, SUNBOX_DATA_QUOTA="200000")
 
     def post(size: int) -> httpx.Response:
         return served.http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)))

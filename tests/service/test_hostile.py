@@ -82,7 +82,7 @@ EVERYTHING: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def modest(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server with narrow limits. It must be there in the end, and go in good order."""
-    served = Server(tmp_path_factory.mktemp("modest"), warms=False, **LIMITS)
+    served = Server(tmp_path_factory.mktemp("modest"), **LIMITS)
     served.wait()
     yield served
     served.wait()

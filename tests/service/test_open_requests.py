@@ -91,7 +91,7 @@ def test_an_address_leaves_room_for_others() -> None:
 def proxied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server to which this test is a trusted proxy."""
     limits = {"SUNBOX_TRUSTED_PROXIES": "127.0.0.0/8", "SUNBOX_MAX_CONNECTIONS": "16"}
-    served = Server(tmp_path_factory.mktemp("proxied"), warms=False, **limits)
+    served = Server(tmp_path_factory.mktemp("proxied"), **limits)
     yield served
     assert served.stop() == 0
 

@@ -82,7 +82,7 @@ def test_requests_have_ids(server: Server) -> None:
 def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
     """Every line is an object, the renderer's process included; a refusal bears its request's id and no secret."""
     variables = {"SUNBOX_LOG_FORMAT": "json", "SUNBOX_API_KEY": "very-secret"}
-    talking = Server(tmp_path, warms=False, **variables)
+    talking = Server(tmp_path, **variables)
     talking.wait()
     key = {"authorization": "Bearer very-secret", "x-request-id": "mine"}
     assert talking.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL}, headers=key).status_code == 200

@@ -320,7 +320,7 @@ def strict(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     folder = tmp_path_factory.mktemp("strict")
     origins = "https://friend.example, http://other.example:81"
     limits = {"SUNBOX_MAX_BODY": "4000", "SUNBOX_MAX_PIXELS": "1000", "SUNBOX_ALLOWED_ORIGINS": origins}
-    served = Server(folder, warms=False, **limits)
+    served = Server(folder, **limits)
     served.wait()
     yield served
     served.process.kill()
@@ -373,7 +373,7 @@ def test_the_end(strict: Server) -> None:
 
 
 def test_children_end_when_the_server_is_killed(server: Server, tmp_path: Path) -> None:
-    doomed = Server(tmp_path, warms=False)
+    doomed = Server(tmp_path)
     doomed.wait()
     children = doomed.children()
     assert children

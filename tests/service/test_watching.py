@@ -150,7 +150,7 @@ def test_a_stream_of_one_label_tells_of_no_other(server: Server, endless: str) -
 
 
 def test_the_end_of_the_server_ends_the_stream_of_all(tmp_path: Any) -> None:
-    served = Server(tmp_path, warms=False)
+    served = Server(tmp_path)
     served.wait()
     with served.http.stream("GET", "/v1/renders/events") as answer:
         assert answer.status_code == 200

@@ -16,6 +16,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
+from service.config import Ahead
 from service.ipc import channel, heartbeat
 from service.logs import setup
 from service.system.child_processes import inherited_environment
@@ -95,6 +96,7 @@ class Options:
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
     host_memory: int | None = None  # the same where that is the machine's memory
     checkpoint_s: float = inf  # between two of a render; inf: none before its end
+    ahead: Ahead = "some"
 
 
 class Process:
@@ -192,7 +194,7 @@ def _spawn(
 ) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.worker", str(end.fileno()), str(heartbeat_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(setup.level())]
-    command += ["--checkpoint", str(options.checkpoint_s)]
+    command += ["--checkpoint", str(options.checkpoint_s), "--ahead", options.ahead]
     command += ["--name", options.name, *(["--software"] if options.software else [])]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]

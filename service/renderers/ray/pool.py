@@ -76,5 +76,10 @@ def cluster_pool(config: Config) -> ClusterPool:
     """The renderers of SUNBOX_RAY. Raises CannotJoin, within half a minute at most."""
     assert config.ray is not None
     # The memory of a node is its own: SUNBOX_MEMORY is about this machine.
-    options = {"patience_s": config.hang_s, "memory": config.gpu_memory, "checkpoint_s": config.checkpoint_s}
+    options = {
+        "patience_s": config.hang_s,
+        "memory": config.gpu_memory,
+        "checkpoint_s": config.checkpoint_s,
+        "ahead": config.ahead,
+    }
     return ClusterPool(Cluster(config.ray, config.ray_renderers, config.require_gpu, options))

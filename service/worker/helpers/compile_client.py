@@ -110,10 +110,17 @@ class CompileClient:
     has lowered its priority raise it again."""
 
     def __init__(
-        self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool], lifeline: int | None = None
+        self,
+        info: dict[str, Any],
+        device: int | None,
+        crowded: Callable[[], bool],
+        lifeline: int | None = None,
+        foresees: bool = True,
     ) -> None:
         """`info` is the renderer's; `crowded`: compiling in the loop would stall somebody. `lifeline`: the process
-        for "now" ends with the server; where only the renderer is killed it finishes its kernel, for the next one."""
+        for "now" ends with the server; where only the renderer is killed it finishes its kernel, for the next one.
+        Without `foresees` only kernels that somebody waits for are compiled."""
+        self.foresees = foresees
         self._driver = driver_of(info)
         self._crowded = crowded
         self._able = _has_cache()
@@ -166,6 +173,8 @@ class CompileClient:
     def prepare(self, keys: list[KernelKey], priority: Priority, client: str = "", done: Done | None = None) -> None:
         """Queue the kernels that are not compiled, although nobody waits for them. With `done` they take the place of
         those that were prepared with it before."""
+        if not self.foresees:
+            return
         lane = self._lanes[priority]
         if done is not None:
             lane.forget(done)

@@ -158,7 +158,7 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 def test_without_the_library_the_service_says_so_and_goes_on(
     broken: dict[str, str], tmp_path: Path, raw: Any
 ) -> None:
-    server = Server(tmp_path, warms=False, **broken)
+    server = Server(tmp_path, **broken)
     try:
         server.wait()
         for _ in range(2):

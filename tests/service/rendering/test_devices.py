@@ -145,7 +145,7 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
     """It says which they are; each has one core, and so has what it starts; both end with it."""
     if configs.cores() < 2:
         pytest.skip("there is one core")
-    server = Server(tmp_path, warms=False, SUNBOX_DEVICES="llvmpipe:2")
+    server = Server(tmp_path, SUNBOX_DEVICES="llvmpipe:2")
     server.wait()
     workers = [pid for pid in server.children() if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     share = configs.cores() // 2

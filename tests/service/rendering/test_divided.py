@@ -17,7 +17,7 @@ from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule,
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.supervisors import LINEAR, Ears, arrays_of, settings
+from tests.supervisors import LINEAR, Ears, arrays_of, renderer_options, settings
 
 SIDE, SAMPLES = 96, 500  # the last block ends before its border
 
@@ -44,7 +44,7 @@ class _Divided:
         self.broken: int | None = None  # the renderer that does not begin any more
 
     def _start(self, number: int, *given: Any) -> Process:
-        return Process(Options(device=99) if number == self.broken else Options(checkpoint_s=0.2), *given)
+        return Process(Options(device=99) if number == self.broken else renderer_options(checkpoint_s=0.2), *given)
 
     async def begin(self, samples: int = SAMPLES) -> None:
         self.pool.start()

@@ -17,7 +17,7 @@ SETTINGS = {"width": 96, "height": 80, "max_samples": 200, "seed": 9}
 
 @pytest.fixture(scope="module")
 def two(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    server = Server(tmp_path_factory.mktemp("two"), warms=False, SUNBOX_DEVICES="llvmpipe:2")
+    server = Server(tmp_path_factory.mktemp("two"), SUNBOX_DEVICES="llvmpipe:2")
     until = time.monotonic() + PATIENCE_S
     while any(each["state"] != "ready" for each in server.http.get("/v1/info").json()["renderers"]):
         assert time.monotonic() < until

@@ -30,7 +30,7 @@ from service.storage.database import FILE
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, kill, wait_until
 from tests.serving import Server as AnyServer
 
-Server = partial(AnyServer, warms=False)
+Server = partial(AnyServer)
 OFTEN = {"SUNBOX_CHECKPOINT_S": "0.1", "SUNBOX_MAX_RUNNING": "1"}
 LONG = {"width": 96, "height": 96, "max_samples": 1500, "seed": 3}
 ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}

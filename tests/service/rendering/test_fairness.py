@@ -17,6 +17,7 @@ from service.renderers.statistics import Kind
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
+from tests.supervisors import renderer_options
 
 SIDE = {"width": 64, "height": 64}
 
@@ -53,7 +54,7 @@ def sharing(
     """
 
     async def run() -> list[float]:
-        supervisor = Supervisor()
+        supervisor = Supervisor(renderer_options())
         supervisor.start()
         await supervisor.ready(30)
         used = supervisor.statistics.gpu_s_of

@@ -13,9 +13,8 @@ from gpu import Renderer, SceneEdit
 from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.problems import Unavailable
 from service.renderers.local import restarts
-from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
-from tests.supervisors import LINEAR, Ears, arrays_of, settings, with_supervisor
+from tests.supervisors import LINEAR, Ears, arrays_of, renderer_options, settings, with_supervisor
 
 
 async def replaced(supervisor: Supervisor, number: int = signal.SIGKILL) -> None:
@@ -151,7 +150,7 @@ def test_work_is_taken_while_it_is_replaced(gpu: Renderer) -> None:
 
 def test_it_starts_as_fast_as_others_and_steps_back_then(gpu: Renderer) -> None:
     async def test() -> None:
-        supervisor = Supervisor(Options())
+        supervisor = Supervisor(renderer_options())
         supervisor.start()
         own = os.getpriority(os.PRIO_PROCESS, 0)
         assert niceness(supervisor.process_id) == {own}

@@ -28,7 +28,7 @@ from service.ipc.messages import (
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.supervisors import LINEAR, Ears, arrays_of, settings
+from tests.supervisors import LINEAR, Ears, arrays_of, renderer_options, settings
 
 ENDLESS = 1 << 24
 
@@ -38,7 +38,7 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
     broken = False
 
     def start(*given: Any) -> Process:
-        return Process(Options(device=99) if broken else Options(checkpoint_s=0.1), *given)
+        return Process(Options(device=99) if broken else renderer_options(checkpoint_s=0.1), *given)
 
     async def rendering(pool: Pool, ears: Ears, samples: int) -> int:
         task = pool.open(ears, "render")
@@ -52,7 +52,7 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
 
     async def test() -> None:
         nonlocal broken
-        pool = Pool([Seat(Place("0")), Seat(Place("1"), start=start)])
+        pool = Pool([Seat(Place("0"), renderer_options()), Seat(Place("1"), start=start)])
         pool.start()
         try:
             while not all(member.state == "ready" for member in pool.members):
@@ -109,7 +109,7 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
 
 def test_a_picture_of_another_driver_begins_again(gpu: Renderer) -> None:
     async def test() -> None:
-        pool = Pool([Seat(options=Options(checkpoint_s=0.05))])
+        pool = Pool([Seat(options=renderer_options(checkpoint_s=0.05))])
         pool.start()
         try:
             await pool.ready(60)

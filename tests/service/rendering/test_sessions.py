@@ -179,7 +179,7 @@ def test_two_variants_count_as_one_client() -> None:
 def test_a_session_belongs_to_its_key(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Whoever has read its id somewhere else neither takes it up, nor has a second one beside it."""
     limits = {"SUNBOX_API_KEY": "anna-key,bert-key", "SUNBOX_MAX_CLIENTS": "1"}
-    server = Server(tmp_path_factory.mktemp("keyed"), warms=False, **limits)
+    server = Server(tmp_path_factory.mktemp("keyed"), **limits)
     try:
         server.wait()
         first = Client(server.url, key="anna-key")
@@ -198,7 +198,7 @@ def test_a_session_belongs_to_its_key(gpu: object, tmp_path_factory: pytest.Temp
 
 
 def test_too_many_clients_and_going_away(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> None:
-    server = Server(tmp_path_factory.mktemp("small"), warms=False, SUNBOX_MAX_CLIENTS="1")
+    server = Server(tmp_path_factory.mktemp("small"), SUNBOX_MAX_CLIENTS="1")
     server.wait()
     first, session = entered(server)
     assert server.http.get("/v1/info").json()["limits"]["max_clients"] == 1

@@ -16,7 +16,6 @@ from gpu import Renderer
 from service.ipc.messages import Done, Progress, SavedPicture, View
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.quality import ResolvedSettings
-from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
 from service.renders import preemption, slots
 from service.renders.job import Job
@@ -29,6 +28,7 @@ from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, Renderers, until
+from tests.supervisors import renderer_options
 
 
 @pytest.fixture
@@ -307,7 +307,7 @@ def test_what_gave_way_ends_with_the_same_bits(
         return PACKED
 
     async def scenario() -> None:
-        supervisor = Supervisor(Options(checkpoint_s=2.0))
+        supervisor = Supervisor(renderer_options(checkpoint_s=2.0))
         supervisor.start()
         await supervisor.ready(30)
         queue = RenderQueue(replace(LIMITS, running=1), RenderStore(tmp_path))

@@ -162,7 +162,7 @@ def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, 
     change(folder, "cancelled", "settings", "{")
     with closing(sqlite3.connect(folder / FILE)) as file, file:  # it was kept for as long as it lies here
         file.execute("UPDATE renders SET ended_at = unixepoch() WHERE ended_at IS NOT NULL")
-    served = Server(tmp_path, warms=False, SUNBOX_API_KEY="anna")
+    served = Server(tmp_path, SUNBOX_API_KEY="anna")
     try:
         served.http.headers.update(frozen.KEY)
         assert served.http.get(f"/v1/renders/{ids['gone']}").status_code == 410

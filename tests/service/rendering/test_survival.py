@@ -188,7 +188,7 @@ def test_who_rests_makes_room(fragile: Server) -> None:
 
 def test_a_server_that_is_told_twice_in_a_row_ends_well(tmp_path: Path) -> None:
     """As `timeout` tells it. Its processes end with it, and its log tells of no error."""
-    server = Server(tmp_path, warms=False)
+    server = Server(tmp_path)
     server.wait()
     with opened(server) as client:
         client.start(settings=ENDLESS)

@@ -43,7 +43,7 @@ from service.worker.progress.noise import NoiseReading
 from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE
-from tests.supervisors import ENDLESS, LINEAR, Ears, settings
+from tests.supervisors import ENDLESS, LINEAR, Ears, renderer_options, settings
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def arrays(gpu: Renderer) -> Any:
 def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Supervisor], Awaitable[None]]], None]]:
     """Runs a test with a renderer's process that all tests of this file share."""
     with asyncio.Runner() as runner:
-        supervisor = Supervisor()
+        supervisor = Supervisor(renderer_options())
 
         async def start() -> None:
             supervisor.start()
@@ -367,7 +367,7 @@ def test_no_renderer_is_told_after_three_tries(gpu: Renderer) -> None:
 
 def test_it_ends_with_its_link(gpu: Renderer, arrays: Any) -> None:
     async def test() -> None:
-        supervisor, ears = Supervisor(), Ears()
+        supervisor, ears = Supervisor(renderer_options()), Ears()
         supervisor.start()
         await supervisor.ready(PATIENCE_S)
         task = supervisor.open(ears)

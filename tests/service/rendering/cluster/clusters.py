@@ -31,7 +31,7 @@ for node in ray.nodes():
 QUICK = {"RAY_health_check_period_ms": "500", "RAY_health_check_failure_threshold": "2"}
 SAMPLES = 400
 ENDLESS = 1 << 24
-OPTIONS = {"patience_s": 10.0, "checkpoint_s": 0.05}
+OPTIONS = {"patience_s": 10.0, "checkpoint_s": 0.05, "ahead": "off"}
 
 
 async def begun(renderers: Pool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
