@@ -6,7 +6,7 @@ import asyncio
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from gpu import RenderSettings
 from service.ipc.messages import FromRenderer, StopRule, View
@@ -64,6 +64,12 @@ class Ears:
             assert not isinstance(message, str), message
             if message.task == task and isinstance(message, kinds):
                 return message
+
+
+class Rendering(Protocol):
+    """Runs a test with the supervisor of a renderer, which stores renders as often as `checkpoint_s` says."""
+
+    def __call__(self, test: Callable[[Supervisor], Awaitable[None]], checkpoint_s: float = 2.0) -> None: ...
 
 
 def renderer_options(**given: Any) -> Options:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from service.config import Config
@@ -12,10 +12,12 @@ from service.ipc.messages import Done, Progress, Ready, Restore, SavedPicture, U
 from service.pack import Packed, pack
 from service.problems import Unavailable
 from service.quality import resolve
+from service.renderers.local.process import Cause
+from service.renderers.local.supervisor import Supervisor
 from service.renderers.statistics import Statistics
 from service.scene import parse_scene, parse_settings
 from tests.documents import Shelf
-from tests.serving import SCENE
+from tests.serving import PATIENCE_S, SCENE
 
 SETTINGS = resolve(parse_settings({"width": 4, "height": 4, "max_samples": 8}, "", Config()))
 PACKED = pack(parse_scene(SCENE), Shelf())
@@ -78,7 +80,10 @@ async def until(condition: Callable[[], object]) -> None:
 
 
 class Fake:
-    """A renderer's process: `told` is what it was sent, and a test has it report by `say(message)` and `lose()`."""
+    """A renderer's process: `told` is what it was sent, and a test has it report by `say(message)` and `lose()`, for
+    the reason `cause`."""
+
+    cause: Cause = "crashed"
 
     def __init__(self, driver: str, received: Callable[[Any], None], lost: Callable[[], None], lifeline: Any) -> None:
         self.began = self.lived_s = 0.0
@@ -107,4 +112,34 @@ class Fake:
     def watch(self, excused: bool = False) -> None: ...
 
     async def end(self, patience_s: float) -> Any:
-        return "crashed"
+        return self.cause
+
+
+class FakeProcesses:
+    """Begins a fake after the other; `now` is the one there is. With the driver "" they cannot render."""
+
+    def __init__(self, driver: str = "fake", cause: Cause = "crashed") -> None:
+        self.began = 0
+        self._driver, self._cause = driver, cause
+        self.now: Fake
+
+    def __call__(self, *given: Any) -> Any:
+        self.began += 1
+        self.now = Fake(self._driver, *given)
+        self.now.cause = self._cause
+        return self.now
+
+
+def with_fake_processes(test: Callable[[Supervisor], Awaitable[None]], processes: FakeProcesses) -> None:
+    """Run a test with a supervisor whose processes are fakes."""
+
+    async def run() -> None:
+        supervisor = Supervisor(start=processes)
+        supervisor.start()
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await test(supervisor)
+        finally:
+            await supervisor.close()
+
+    asyncio.run(run())

@@ -19,15 +19,15 @@ from service.pack import pack, pack_material
 from service.problems import TooManyRequests
 from service.renderers.bsdf_questions import LONG_AT_ONCE, MOST, BsdfQuestions
 from service.renderers.local.supervisor import Supervisor
-from service.scene import PrincipledMaterial, parse_scene
+from service.scene import DiffuseMaterial, parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
-from tests.supervisors import LINEAR, SIZE, Ears, compile_helpers, with_supervisor
+from tests.supervisors import LINEAR, SIZE, Ears, Rendering, compile_helpers, with_supervisor
 
-GLASS = pack_material(PrincipledMaterial(type="principled", transmission=1.0, roughness=0.4))
+GREY = pack_material(DiffuseMaterial(type="diffuse", albedo=0.5))
 UP = np.array([[0.0, 0.0, 1.0]])
-SHORT = EvaluateBsdf(0, "values", GLASS, UP, UP)
-LONG = EvaluateBsdf(0, "albedo", GLASS, np.repeat(UP, 64, axis=0), UP[:0], samples=1 << 20)
+SHORT = EvaluateBsdf(0, "values", GREY, UP, UP)
+LONG = EvaluateBsdf(0, "albedo", GREY, np.repeat(UP, 64, axis=0), UP[:0], samples=1 << 20)
 
 # The kernels of `openpbr` take as long as all others together; a record of `measured` that is all zeros, as that of a
 # bare material, cannot be sampled.
@@ -122,7 +122,7 @@ def test_the_foreseen_kernels_are_those_that_are_used(gpu: Renderer, cold: Path)
     assert sum(path.is_file() for path in cold.rglob("*")) == before >= len(distinct)
 
 
-def test_who_goes_away_takes_the_question_along(gpu: Renderer) -> None:
+def test_who_goes_away_takes_the_question_along(rendering: Rendering) -> None:
     async def test(supervisor: Supervisor) -> None:
         questions = BsdfQuestions(supervisor)
         await questions.ask(SHORT)
@@ -140,7 +140,7 @@ def test_who_goes_away_takes_the_question_along(gpu: Renderer) -> None:
         await asyncio.sleep(0.6)
         assert dict(used) == told
 
-    with_supervisor(test)
+    rendering(test)
 
 
 def test_a_caller_s_questions_refuse_nobody_else_s() -> None:

@@ -17,7 +17,7 @@ from service.renderers.statistics import Kind
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
-from tests.supervisors import renderer_options
+from tests.supervisors import Rendering
 
 SIDE = {"width": 64, "height": 64}
 
@@ -41,6 +41,7 @@ def arrays(gpu: Renderer) -> Any:
 
 
 def sharing(
+    rendering: Rendering,
     arrays: Any,
     clients: list[tuple[Kind, str]],
     seconds: float,
@@ -53,10 +54,10 @@ def sharing(
     while with supervisor, tasks and count.
     """
 
-    async def run() -> list[float]:
-        supervisor = Supervisor(renderer_options())
-        supervisor.start()
-        await supervisor.ready(30)
+    shares: list[float] = []
+
+    async def test(supervisor: Supervisor) -> None:
+        nonlocal shares
         used = supervisor.statistics.gpu_s_of
         for interactive in (True, False):  # kernels are compiled before anybody pays for them
             first = supervisor.open(Deaf(), "server")
@@ -76,26 +77,27 @@ def sharing(
             if act is not None:
                 act(supervisor, tasks, count := count + 1)
             shares = [used[task] for task in tasks]  # what they used to load included: who had more waits
-        await supervisor.close()
-        return shares
 
-    return asyncio.run(run())
+    rendering(test)
+    return shares
 
 
-def test_thirty_two_equal_clients(arrays: Any) -> None:
+@pytest.mark.slow
+def test_thirty_two_equal_clients(rendering: Rendering, arrays: Any) -> None:
     """Streams and renders: Jain's index, over about as many turns as it takes to tell."""
     clients: list[tuple[Kind, str]] = [("stream" if n % 2 else "render", f"client {n}") for n in range(32)]
-    shares = sharing(arrays, clients, 7.0, enough=lambda shares: jain(shares) >= 0.95)
+    shares = sharing(rendering, arrays, clients, 7.0, enough=lambda shares: jain(shares) >= 0.95)
     assert jain(shares) >= 0.95, shares
 
 
-def test_all_that_one_key_renders_is_one_client(arrays: Any) -> None:
-    shares = sharing(arrays, [("render", "busy")] * 4 + [("stream", "busy")] * 2 + [("stream", "")], 2.5)
+@pytest.mark.slow
+def test_all_that_one_key_renders_is_one_client(rendering: Rendering, arrays: Any) -> None:
+    shares = sharing(rendering, arrays, [("render", "busy")] * 4 + [("stream", "busy")] * 2 + [("stream", "")], 2.5)
     assert 0.4 < shares[-1] / sum(shares) < 0.6, shares
     assert jain(shares[:-1]) > 0.8, shares
 
 
-def test_a_flood_of_edits_takes_no_more_than_its_part(arrays: Any) -> None:
+def test_a_flood_of_edits_takes_no_more_than_its_part(rendering: Rendering, arrays: Any) -> None:
     """Whole scenes, one after the other: to load them is work like any other."""
 
     def flood(supervisor: Supervisor, tasks: list[int], count: int) -> None:
@@ -103,13 +105,13 @@ def test_a_flood_of_edits_takes_no_more_than_its_part(arrays: Any) -> None:
             Update(tasks[0], 1 + count, edit=SceneEdit(materials=arrays.materials), settings=SIDE | {"seed": count})
         )
 
-    shares = sharing(arrays, [("stream", "hostile"), ("stream", "kind"), ("render", "other")], 3.0, flood)
+    shares = sharing(rendering, arrays, [("stream", "hostile"), ("stream", "kind"), ("render", "other")], 3.0, flood)
     assert shares[0] / sum(shares) < 0.5, shares
 
 
-def test_who_pauses_uses_nothing(arrays: Any) -> None:
+def test_who_pauses_uses_nothing(rendering: Rendering, arrays: Any) -> None:
     def pause(supervisor: Supervisor, tasks: list[int], count: int) -> None:
         supervisor.send(Pause(tasks[0]))
 
-    shares = sharing(arrays, [("stream", "hidden"), ("stream", "seen")], 3.0, pause)
+    shares = sharing(rendering, arrays, [("stream", "hidden"), ("stream", "seen")], 3.0, pause)
     assert shares[0] < 0.4 * shares[1], shares  # it was loaded, and seen once

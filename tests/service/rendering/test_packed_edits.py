@@ -21,7 +21,7 @@ from service.scene import parse_scene
 from service.worker.task import HOLD_S
 from tests.documents import Shelf
 from tests.serving import SCENE
-from tests.supervisors import ENDLESS, LINEAR, Ears, settings, with_supervisor
+from tests.supervisors import ENDLESS, LINEAR, Ears, Rendering, settings
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def arrays(gpu: Renderer) -> Any:
     return pack(parse_scene(SCENE), Shelf()).arrays
 
 
-def test_a_held_task_stands_still_for_a_moment_or_until_its_update(arrays: Any) -> None:
+def test_a_held_task_stands_still_for_a_moment_or_until_its_update(rendering: Rendering, arrays: Any) -> None:
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()
         task = supervisor.open(ears)
@@ -53,11 +53,11 @@ def test_a_held_task_stands_still_for_a_moment_or_until_its_update(arrays: Any) 
                 assert frame.generation == 2
         supervisor.drop(task)
 
-    with_supervisor(test)
+    rendering(test)
 
 
 def test_a_large_edit_is_copied_off_the_event_loop_and_survives_the_renderer(
-    arrays: Any, monkeypatch: pytest.MonkeyPatch
+    rendering: Rendering, arrays: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(messages, "LARGE", 0)
     dim = replace(arrays.environment, scale=0.25)
@@ -94,4 +94,4 @@ def test_a_large_edit_is_copied_off_the_event_loop_and_survives_the_renderer(
             supervisor.drop(task)
         assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[2])
 
-    with_supervisor(test)
+    rendering(test)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,16 @@ from service.ipc.messages import (
     Progress,
     Read,
     Restore,
-    SavedPicture,
     StopRule,
     Update,
     View,
     Want,
 )
 from service.renderers.local.process import Options, Process
+from service.renderers.local.supervisor import Supervisor
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.supervisors import LINEAR, Ears, arrays_of, renderer_options, settings
+from tests.supervisors import LINEAR, Ears, Rendering, arrays_of, renderer_options, settings
 
 ENDLESS = 1 << 24
 
@@ -107,31 +108,23 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
     asyncio.run(test())
 
 
-def test_a_picture_of_another_driver_begins_again(gpu: Renderer) -> None:
-    async def test() -> None:
-        pool = Pool([Seat(options=renderer_options(checkpoint_s=0.05))])
-        pool.start()
-        try:
-            await pool.ready(60)
-            first, update = Ears(), Update(0, 1, arrays_of("plain"), settings(64), StopRule(ENDLESS))
-            task = pool.open(first, "render")
-            await pool.send_scene(Update(task, 1, update.scene, update.settings, update.stop))
-            saved = await first.next(Checkpoint)
-            pool.drop(task)
-            assert saved.saved.driver == pool.members[0].driver
-            for driver, begins in ((saved.saved.driver, []), ("another", ["again"])):
-                ears, stop = Ears(), StopRule(saved.progress.samples + 4)
-                task = pool.open(ears, "render")
-                picture = SavedPicture(saved.saved.samples, saved.saved.under_way, saved.saved.buffers, driver)
-                await pool.send_scene(
-                    Update(task, 1, update.scene, update.settings, stop),
-                    Restore(task, 1, picture, None, Progress(saved.progress.samples, None, 1000.0)),
-                )
-                done = await ears.next(Done | str)
-                again = [done] if isinstance(done, str) else []
-                done = done if isinstance(done, Done) else await ears.next(Done)
-                assert again == begins and (done.progress.elapsed_s > 1000) is (not begins)
-        finally:
-            await pool.close()
+def test_a_picture_of_another_driver_begins_again(rendering: Rendering) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        first, update = Ears(), Update(0, 1, arrays_of("plain"), settings(64), StopRule(ENDLESS))
+        task = supervisor.open(first, "render")
+        await supervisor.send_scene(replace(update, task=task))
+        saved = await first.next(Checkpoint)
+        supervisor.drop(task)
+        assert saved.saved.driver == supervisor.driver
+        for driver, begins in ((saved.saved.driver, []), ("another", ["again"])):
+            ears, stop = Ears(), StopRule(saved.progress.samples + 4)
+            task = supervisor.open(ears, "render")
+            progress = Progress(saved.progress.samples, None, 1000.0)
+            restore = Restore(task, 1, replace(saved.saved, driver=driver), None, progress)
+            await supervisor.send_scene(replace(update, task=task, stop=stop), restore)
+            done = await ears.next(Done | str)
+            again = [done] if isinstance(done, str) else []
+            done = done if isinstance(done, Done) else await ears.next(Done)
+            assert again == begins and (done.progress.elapsed_s > 1000) is (not begins)
 
-    asyncio.run(test())
+    rendering(test, checkpoint_s=0.05)

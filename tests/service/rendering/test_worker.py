@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Awaitable, Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +33,7 @@ from service.ipc.messages import (
 from service.ipc.task_control import Drop, Hold, Pause, Resume, Stop
 from service.pack import pack
 from service.problems import Unavailable
-from service.renderers.local.process import Options
+from service.renderers.local.keeper import CLOSING
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
 from service.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
@@ -42,8 +41,9 @@ from service.worker.loop import Loop, coalesced
 from service.worker.progress.noise import NoiseReading
 from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from tests.documents import Shelf
+from tests.service.rendering.fakes import FakeProcesses, with_fake_processes
 from tests.serving import PATIENCE_S, SCENE
-from tests.supervisors import ENDLESS, LINEAR, Ears, renderer_options, settings
+from tests.supervisors import ENDLESS, LINEAR, Ears, settings
 
 
 @pytest.mark.parametrize(
@@ -190,21 +190,6 @@ def arrays(gpu: Renderer) -> Any:
     return pack(parse_scene(SCENE), Shelf()).arrays
 
 
-@pytest.fixture(scope="module")
-def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Supervisor], Awaitable[None]]], None]]:
-    """Runs a test with a renderer's process that all tests of this file share."""
-    with asyncio.Runner() as runner:
-        supervisor = Supervisor(renderer_options())
-
-        async def start() -> None:
-            supervisor.start()
-            await supervisor.ready(PATIENCE_S)
-
-        runner.run(start())
-        yield lambda test: runner.run(test(supervisor))  # type: ignore[arg-type]
-        runner.run(supervisor.close())
-
-
 def test_load_trace_done_read(rendering: Any, arrays: Any) -> None:
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()
@@ -343,39 +328,25 @@ def test_what_was_used_is_told(rendering: Any, arrays: Any) -> None:
     rendering(test)
 
 
-def test_it_is_polite(rendering: Any) -> None:
+def test_no_renderer_is_told_after_three_tries(impatient: None) -> None:
+    processes = FakeProcesses("")
+
     async def test(supervisor: Supervisor) -> None:
-        nice = Path(f"/proc/{supervisor.process_id}/stat").read_text().rsplit(")", 1)[1].split()[16]
-        assert int(nice) >= 10
-
-    rendering(test)
-
-
-def test_no_renderer_is_told_after_three_tries(gpu: Renderer) -> None:
-    async def test() -> None:
-        supervisor = Supervisor(Options(device=99))
-        supervisor.start()
-        with pytest.raises(Unavailable) as refused:
-            await supervisor.ready(300)  # three starts one after the other, however busy the machine
-        assert refused.value.detail and "starting" not in refused.value.detail
-        with pytest.raises(Unavailable):
+        with pytest.raises(Unavailable, match="no such device"):
+            await supervisor.ready(PATIENCE_S)
+        assert processes.began == 3
+        with pytest.raises(Unavailable, match="no such device"):
             supervisor.open(Ears())
-        await supervisor.close()
 
-    asyncio.run(test())
+    with_fake_processes(test, processes)
 
 
-def test_it_ends_with_its_link(gpu: Renderer, arrays: Any) -> None:
-    async def test() -> None:
-        supervisor, ears = Supervisor(renderer_options()), Ears()
-        supervisor.start()
+def test_its_end_is_told_to_all_who_have_work_there() -> None:
+    ears = Ears()
+
+    async def test(supervisor: Supervisor) -> None:
         await supervisor.ready(PATIENCE_S)
-        task = supervisor.open(ears)
-        await supervisor.send_scene(Update(task, 1, arrays, settings(512), ENDLESS))
-        await ears.next(Loaded)
-        pid = supervisor.process_id
-        await supervisor.close()
-        assert not Path(f"/proc/{pid}").exists()
-        assert await ears.next(str)
+        supervisor.open(ears)
 
-    asyncio.run(test())
+    with_fake_processes(test, FakeProcesses())
+    assert ears.messages.get_nowait() == CLOSING
