@@ -19,7 +19,8 @@ from tests import kernel_count
 from tests.families import FamilyRenderer
 from tests.privileges import shed
 from tests.rendering import release_pictures
-from tests.serving import AHEAD, Server
+from tests.service.receiving import Receiver
+from tests.serving import AHEAD, CALLBACK_SECRETS, KEYS, Server
 
 TESTS = Path(__file__).parent
 # The files that take longest, in this order: begun last, one of them would leave a core without work.
@@ -35,6 +36,33 @@ LONG_FILES = (
     "shaders/test_lobes.py", "service/bench/test_device.py", "service/rendering/test_checkpoints.py",
 )  # fmt: skip
 
+STRICT = {
+    "SUNBOX_API_KEY": ", ".join(KEYS),
+    "SUNBOX_APIKEY": "misspelt-key",
+    "SUNBOX_LOG_FORMAT": "json",
+    "SUNBOX_MAX_CLIENTS": "2",
+    "SUNBOX_MAX_RUNNING": "1",
+    "SUNBOX_MAX_QUEUE": "2",
+    "SUNBOX_MAX_JOBS": "2",
+    "SUNBOX_KEEP_RENDERS": "6",
+    "SUNBOX_MAX_BODY": "4000",
+    "SUNBOX_MAX_KEY_ASSETS": "65536",
+    "SUNBOX_MAX_PIXELS": "1000",
+    "SUNBOX_MAX_SECONDS": "5",
+    "SUNBOX_MAX_TRIANGLES": "200000",
+    "SUNBOX_BODY_TIMEOUT": "0.5",
+    "SUNBOX_PARSE_SECONDS": "5",
+    "SUNBOX_ALLOWED_ORIGINS": "https://friend.example, http://other.example:81",
+}
+# One render at a time, which is stored often; the renderer has room for two pictures of 500 x 500, and two seconds.
+MORTAL = {
+    "SUNBOX_API_KEY": "anna",
+    "SUNBOX_CALLBACK_SECRET": ",".join(CALLBACK_SECRETS),
+    "SUNBOX_CHECKPOINT_S": "0.1",
+    "SUNBOX_GPU_MEMORY": str(64 << 20),
+    "SUNBOX_HANG_S": "2",
+    "SUNBOX_MAX_RUNNING": "1",
+}
 # Files whose tests wait for kernels that are compiled before anybody waits for them.
 COMPILED_AHEAD = ("gpu/test_foreseen.py", "gpu/test_fallback.py")
 
@@ -156,6 +184,47 @@ def server(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     served.wait()
     yield served
     served.stop()
+
+
+@pytest.fixture(scope="session")
+def strict(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server with two keys and small limits, whose log is for machines; for tests that leave it as it was."""
+    served = Server(tmp_path_factory.mktemp("strict"), **STRICT)
+    served.wait()
+    yield served
+    assert served.stop() == 0
+
+
+@pytest.fixture(scope="session")
+def listening() -> Iterator[Receiver]:
+    """Whom `mortal` may call back."""
+    receiver = Receiver()
+    yield receiver
+    receiver.close()
+
+
+@pytest.fixture(scope="session")
+def _mortal(gpu: Renderer, listening: Receiver, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    hosts = f"{listening.url},http://localhost:{listening.port}"
+    served = Server(tmp_path_factory.mktemp("mortal"), SUNBOX_CALLBACK_HOSTS=hosts, **MORTAL)
+    yield served
+    if served.runs:
+        assert served.stop() == 0
+
+
+@pytest.fixture
+def mortal(_mortal: Server) -> Server:
+    """A server with one key that a test may end or kill, as any process of it, and start again in its folder.
+
+    The next test finds it running, and no render that goes on.
+    """
+    if not _mortal.runs:
+        _mortal.start()
+    _mortal.wait()
+    for state in ("queued", "running"):
+        for each in _mortal.http.get("/v1/renders", params={"state": state}).raise_for_status().json():
+            _mortal.http.delete(f"/v1/renders/{each['id']}").raise_for_status()
+    return _mortal
 
 
 @pytest.fixture

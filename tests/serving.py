@@ -22,6 +22,8 @@ from websockets.typing import Origin, Subprotocol
 
 COLD_S = 150.0  # caches are empty: every kernel is compiled
 AHEAD = "SUNBOX_AHEAD"  # the setting that tests turn off, but those of what is compiled ahead
+KEYS = ("anna-key", "bert-key")  # of the strict server
+CALLBACK_SECRETS = ("whsec_" + "c3VuYm94" * 4, "whsec_" + "b3RoZXIh" * 4)  # of the mortal one
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 SCENE: dict[str, Any] = {
@@ -54,20 +56,35 @@ def wait_until(reached: Callable[[], object], pause_s: float = 0.02) -> None:
 
 class Server:
     """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one. What is
-    compiled ahead is the session's (`AHEAD`), and all other settings are its own."""
+    compiled ahead is the session's (`AHEAD`), and all other settings are its own. Where it has one key, `http` and
+    `client` show that."""
 
     def __init__(self, folder: Path, *, python: Sequence[str] = (), **variables: str) -> None:
-        self.log = folder / "server.log"
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
-        environment |= {AHEAD: os.environ[AHEAD], "SUNBOX_DATA_DIR": str(folder / "data"), **variables}
-        command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
+        self.folder, self.log = folder, folder / "server.log"
+        keys = variables.get("SUNBOX_API_KEY", "")
+        self.key = None if keys == "" or "," in keys else keys
+        own = {AHEAD: os.environ[AHEAD], "SUNBOX_DATA_DIR": str(folder / "data"), **variables}
+        others = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
+        self._environment = others | own
+        self._command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
+        self.start()
+
+    def start(self) -> None:
+        """Start it, with a log of its own; also once more after its end, where it has another address."""
         with self.log.open("wb") as log:
-            self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
+            self.process = subprocess.Popen(
+                self._command, env=self._environment, stdout=subprocess.PIPE, stderr=log, text=True
+            )
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
         assert "http://" in said, self.log.read_text()
         self.url = said[said.index("http://") :].strip().rstrip("/")
-        self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S)
+        headers = {} if self.key is None else {"authorization": f"Bearer {self.key}"}
+        self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S, headers=headers)
+
+    @property
+    def runs(self) -> bool:
+        return self.process.poll() is None
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
         until = time.monotonic() + patience_s
@@ -79,16 +96,21 @@ class Server:
         found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(self.process.pid)], capture_output=True, text=True)
         return [int(pid) for pid in found.stdout.split()]
 
+    def renderers(self) -> list[int]:
+        """Process ids of the renderers that there are just now."""
+        found = []
+        for pid in self.children():
+            with suppress(OSError):  # it may be gone by now
+                if b"service.worker\0" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    found.append(pid)
+        return found
+
     def renderer(self) -> int:
         """The process id of the renderer that there is, or comes."""
-        until = time.monotonic() + PATIENCE_S
-        while True:
-            for pid in self.children():
-                with suppress(OSError):  # it may be gone by now
-                    if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                        return pid
-            assert time.monotonic() < until, self.log.read_text()
+        while not (found := self.renderers()):
+            assert self.runs, self.log.read_text()
             time.sleep(0.02)
+        return found[0]
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         """The exit code."""
@@ -240,7 +262,7 @@ class Client:
 @contextmanager
 def client(server: Server) -> Iterator[Client]:
     """A stream that has said hello."""
-    opened = Client(server.url)
+    opened = Client(server.url, key=server.key)
     with opened:
         assert opened.until("hello")
         yield opened

@@ -24,7 +24,7 @@ from PIL import Image
 
 from sunbox import agent_work
 from sunbox.agent_tools import agent_server
-from tests.serving import SCENE, Server, served
+from tests.serving import KEYS, SCENE, Server
 
 TINY = {"width": 32, "height": 24, "max_samples": 8}
 TOOLS = {"render", "render_sheet", "patch", "validate", "inspect", "compare", "materials", "bsdf"}
@@ -296,17 +296,16 @@ def test_names_in_documents_stay_quoted(agent: Agent) -> None:
     )
 
 
-def test_saved_scenes_belong_to_their_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_saved_scenes_belong_to_their_key(strict: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     """The key comes from the environment."""
-    with served(tmp_path, SUNBOX_API_KEY="anna,bert") as keyed:
-        monkeypatch.setenv("SUNBOX_API_KEY", "anna")
-        agent = Agent(keyed.url)
-        try:
-            keyed.http.headers["authorization"] = "Bearer anna"
-            keyed.http.put("/v1/documents/scenes/mine", json=SCENE).raise_for_status()
-            assert result(agent.done("render", scene="mine", settings=TINY))["samples"] == 8
-        finally:
-            agent.close()
+    monkeypatch.setenv("SUNBOX_API_KEY", KEYS[0])
+    agent = Agent(strict.url)
+    try:
+        key = {"authorization": f"Bearer {KEYS[0]}"}
+        strict.http.put("/v1/documents/scenes/mine", json=SCENE, headers=key).raise_for_status()
+        assert result(agent.done("render", scene="mine", settings=TINY))["samples"] == 8
+    finally:
+        agent.close()
 
 
 def test_a_server_that_does_not_answer_is_a_mistake() -> None:

@@ -22,7 +22,7 @@ from tests.calls import is_problem
 from tests.service.stored_assets import mesh_scene
 from tests.serving import ENDLESS, SCENE, SMALL, Client, Server
 
-ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}
+ANNA, BERT = {"authorization": "Bearer anna-key"}, {"authorization": "Bearer bert-key"}
 MISSING = "sha256:" + "0" * 64
 
 
@@ -76,13 +76,6 @@ def test_the_parts_of_a_scene_are_its_owner_s_also_where_they_are_made_again(kep
     assert kept.access.foreign("anna", parts) == set() and kept.access.foreign("bert", parts) == parts
 
 
-@pytest.fixture(scope="module")
-def keyed(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    served = Server(tmp_path_factory.mktemp("keyed"), SUNBOX_API_KEY="anna,bert")
-    yield served
-    assert served.stop() == 0
-
-
 def uploaded(server: Server, data: bytes, key: dict[str, str] = ANNA) -> Any:
     answer = server.http.post("/v1/assets", content=data, headers=key)
     assert answer.status_code == 201
@@ -97,27 +90,27 @@ def render(server: Server, scene: Any, path: str = "/v1/renders", key: dict[str,
     return server.http.post(path, json={"scene": scene, "settings": SMALL}, headers=key)
 
 
-def test_another_key_s_asset_does_not_exist(keyed: Server) -> None:
-    id = uploaded(keyed, OBJ + b"# secret")["id"]
-    assert get(keyed, id, ANNA).content == OBJ + b"# secret"
-    assert get(keyed, id, ANNA).headers["cache-control"].startswith("private")
+def test_another_key_s_asset_does_not_exist(strict: Server) -> None:
+    id = uploaded(strict, OBJ + b"# secret")["id"]
+    assert get(strict, id, ANNA).content == OBJ + b"# secret"
+    assert get(strict, id, ANNA).headers["cache-control"].startswith("private")
 
     def same(found: str, other: str) -> bool:
         return found.replace(id, MISSING) == other
 
     for path in ("{}", "{}/scene"):
-        mine, missing = (get(keyed, path.format(each)) for each in (id, MISSING))
+        mine, missing = (get(strict, path.format(each)) for each in (id, MISSING))
         assert is_problem(mine, 404) and same(mine.text, missing.text)
     for path in ("/v1/render", "/v1/renders"):
-        mine, missing = (render(keyed, mesh_scene(each), path) for each in (id, MISSING))
+        mine, missing = (render(strict, mesh_scene(each), path) for each in (id, MISSING))
         assert is_problem(mine, 422, "/scene/shapes/0/asset") and same(mine.text, missing.text)
     sky = {**SCENE, "environment": {"type": "image", "asset": id}}
-    assert is_problem(render(keyed, sky), 422, "/scene/environment/asset")
+    assert is_problem(render(strict, sky), 422, "/scene/environment/asset")
     mine, missing = (
-        keyed.http.put("/v1/documents/scenes/b", json=mesh_scene(each), headers=BERT) for each in (id, MISSING)
+        strict.http.put("/v1/documents/scenes/b", json=mesh_scene(each), headers=BERT) for each in (id, MISSING)
     )
     assert is_problem(mine, 422, "/shapes/0/asset") and same(mine.text, missing.text)
-    with Client(keyed.url, key="bert") as client:
+    with Client(strict.url, key="bert-key") as client:
         client.start(scene=mesh_scene(id))
         refused = client.until("error")[0]["problem"]
         assert [each["pointer"] for each in refused["errors"]] == ["/scene/shapes/0/asset"]
@@ -125,38 +118,38 @@ def test_another_key_s_asset_does_not_exist(keyed: Server) -> None:
         client.frame(2)
         client.say("update", generation=3, scene={"shapes": mesh_scene(id)["shapes"]})
         assert client.until("error")[0]["problem"] == refused
-    with Client(keyed.url, key="anna") as client:
+    with Client(strict.url, key="anna-key") as client:
         client.start(scene=mesh_scene(id))
         client.frame()
 
 
-def test_naming_an_asset_in_a_render_does_not_give_it(keyed: Server) -> None:
+def test_naming_an_asset_in_a_render_does_not_give_it(strict: Server) -> None:
     """Nor where nothing reads it: a stored render gives its key the assets that it refers to."""
-    id = uploaded(keyed, png(np.full((2, 2, 3), 7, np.uint8)))["id"]
+    id = uploaded(strict, png(np.full((2, 2, 3), 7, np.uint8)))["id"]
     unread = {**SCENE, "textures": {"unread": {"asset": id}}}
-    assert is_problem(render(keyed, unread), 422, "/scene/textures/unread/asset")
-    assert get(keyed, id).status_code == 404
+    assert is_problem(render(strict, unread), 422, "/scene/textures/unread/asset")
+    assert get(strict, id).status_code == 404
 
 
-def test_the_asset_of_a_shared_document_can_be_used(keyed: Server) -> None:
-    id = uploaded(keyed, OBJ + b"# shared")["id"]
-    put = partial(keyed.http.put, "/v1/documents/scenes/gift", json=mesh_scene(id), headers=ANNA)
+def test_the_asset_of_a_shared_document_can_be_used(strict: Server) -> None:
+    id = uploaded(strict, OBJ + b"# shared")["id"]
+    put = partial(strict.http.put, "/v1/documents/scenes/gift", json=mesh_scene(id), headers=ANNA)
     put(params={"shared": True}).raise_for_status()
-    assert get(keyed, id).content == OBJ + b"# shared" and get(keyed, f"{id}/scene").status_code == 200
+    assert get(strict, id).content == OBJ + b"# shared" and get(strict, f"{id}/scene").status_code == 200
     put(params={"shared": False}).raise_for_status()
-    assert get(keyed, id).status_code == 404
+    assert get(strict, id).status_code == 404
     put(params={"shared": True}).raise_for_status()
     body = {"scene": mesh_scene(id), "settings": ENDLESS}
-    mine = keyed.http.post("/v1/renders", json=body, headers=BERT).raise_for_status().json()["id"]
-    keyed.http.delete("/v1/documents/scenes/gift", headers=ANNA).raise_for_status()
-    assert get(keyed, id).status_code == 200, "an own render uses it"
+    mine = strict.http.post("/v1/renders", json=body, headers=BERT).raise_for_status().json()["id"]
+    strict.http.delete("/v1/documents/scenes/gift", headers=ANNA).raise_for_status()
+    assert get(strict, id).status_code == 200, "an own render uses it"
     for _ in range(2):  # cancelled, then deleted
-        keyed.http.delete(f"/v1/renders/{mine}", headers=BERT).raise_for_status()
-    assert get(keyed, id).status_code == 404
+        strict.http.delete(f"/v1/renders/{mine}", headers=BERT).raise_for_status()
+    assert get(strict, id).status_code == 404
 
 
-def test_the_same_bytes_give_access_and_tell_nothing(keyed: Server) -> None:
-    first, second = (uploaded(keyed, glb(gltf()), key) for key in (ANNA, BERT))
+def test_the_same_bytes_give_access_and_tell_nothing(strict: Server) -> None:
+    first, second = (uploaded(strict, glb(gltf()), key) for key in (ANNA, BERT))
     assert first == second
-    document = get(keyed, f"{first['id']}/scene").raise_for_status().json()
-    assert get(keyed, document["shapes"][0]["asset"]).status_code == 200
+    document = get(strict, f"{first['id']}/scene").raise_for_status().json()
+    assert get(strict, document["shapes"][0]["asset"]).status_code == 200

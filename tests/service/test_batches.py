@@ -6,7 +6,6 @@ import io
 import sqlite3
 import zipfile
 from contextlib import closing
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from PIL import Image
 from service.renders.store.check import check_renders
 from service.storage.data_check import check
 from service.storage.database import FILE
-from tests.serving import ENDLESS, SCENE, SMALL, Server, kill, served, wait_until
+from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, kill, wait_until
 
 ROUGHNESS = {"path": "/materials/ball/roughness", "values": [0.1, 0.9]}
 TURN = {"turntable": 3, "degrees": 90}
@@ -152,29 +151,38 @@ def test_an_idempotency_key_starts_one_batch(server: Server) -> None:
     assert other.status_code == 409
 
 
-def test_a_restart_goes_on(tmp_path: Path) -> None:
+def test_a_sheet_is_a_picture_like_others(strict: Server) -> None:
+    """Of two pictures of 768 pixels each, where 1 000 are the most."""
+    key = {"authorization": f"Bearer {KEYS[0]}"}
+    body = {"scene": SCENE, "settings": SMALL, "over": [{"turntable": 2}]}
+    id = strict.http.post("/v1/batches", json=body, headers=key).raise_for_status().json()["id"]
+    assert strict.http.get(f"/v1/batches/{id}", params={"wait": 60}, headers=key).json()["state"] == "done"
+    assert strict.http.get(f"/v1/batches/{id}/sheet", headers=key).status_code == 413
+
+
+def test_a_restart_goes_on(mortal: Server) -> None:
     """After a kill, with one render at a time; what was done stays, and the data folder is sound."""
-    first = Server(tmp_path, SUNBOX_MAX_RUNNING="1", SUNBOX_MAX_PIXELS="4000")
-    id = started(first, [{"turntable": 5, "degrees": 90}], {**SMALL, "max_samples": 512})
-    gone = started(first, [ROUGHNESS], ENDLESS)
-    wait_until(lambda: status(first, id)["counts"]["done"] >= 2)
-    assert first.http.get(f"/v1/batches/{id}/sheet").status_code == 413
-    first.http.delete(f"/v1/batches/{gone}").raise_for_status()
-    cut = started(first, [{"turntable": 3}], ENDLESS)
-    before = {each["id"]: pixels(first, each["id"]) for each in status(first, id)["renders"][:2]}
-    kill(first)
-    with closing(sqlite3.connect(tmp_path / "data" / FILE)) as database, database:  # between that and its renders
+    folder = mortal.folder / "data"
+    id = started(mortal, [{"turntable": 5, "degrees": 90}], {**SMALL, "max_samples": 512})
+    gone = started(mortal, [ROUGHNESS], ENDLESS)
+    wait_until(lambda: status(mortal, id)["counts"]["done"] >= 2)
+    mortal.http.delete(f"/v1/batches/{gone}").raise_for_status()
+    cut = started(mortal, [{"turntable": 3}], ENDLESS)
+    before = {each["id"]: pixels(mortal, each["id"]) for each in status(mortal, id)["renders"][:2]}
+    kill(mortal)
+    with closing(sqlite3.connect(folder / FILE)) as database, database:  # between that and its renders
         database.execute("UPDATE batches SET cancelled = 1 WHERE id = ?", (cut,))
-    with served(tmp_path, SUNBOX_MAX_RUNNING="1") as second:
-        found = status(second, id, 60)
-        assert found["state"] == "done" and found["counts"]["done"] == 5
-        assert all(np.array_equal(picture, pixels(second, render)) for render, picture in before.items())
-        assert status(second, gone)["state"] == "cancelled"
-        assert status(second, cut)["state"] == "cancelled" and status(second, cut)["counts"]["cancelled"] == 3
-        document = second.http.get(f"/v1/renders/{found['renders'][4]['id']}/scene").json()
-        alone = second.http.post("/v1/renders?wait=60", json=document).json()
-        assert np.array_equal(pixels(second, alone["id"]), pixels(second, found["renders"][4]["id"]))
-        assert Image.open(io.BytesIO(file(second, found, "sheet"))).width > 32
-    report = check(tmp_path / "data")
-    check_renders(tmp_path / "data", report)
+    mortal.start()
+    found = status(mortal, id, 60)
+    assert found["state"] == "done" and found["counts"]["done"] == 5
+    assert all(np.array_equal(picture, pixels(mortal, render)) for render, picture in before.items())
+    assert status(mortal, gone)["state"] == "cancelled"
+    assert status(mortal, cut)["state"] == "cancelled" and status(mortal, cut)["counts"]["cancelled"] == 3
+    document = mortal.http.get(f"/v1/renders/{found['renders'][4]['id']}/scene").json()
+    alone = mortal.http.post("/v1/renders?wait=60", json=document).json()
+    assert np.array_equal(pixels(mortal, alone["id"]), pixels(mortal, found["renders"][4]["id"]))
+    assert Image.open(io.BytesIO(file(mortal, found, "sheet"))).width > 32
+    assert mortal.stop() == 0
+    report = check(folder)
+    check_renders(folder, report)
     assert report.faults == []

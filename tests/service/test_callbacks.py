@@ -21,32 +21,16 @@ from service.storage.database import Database
 from sunbox import Client
 from tests.calls import is_problem, metrics
 from tests.service.receiving import Heard, Receiver
-from tests.serving import ENDLESS, SCENE, SMALL, Server, kill, served, wait_until
+from tests.serving import CALLBACK_SECRETS, ENDLESS, SCENE, SMALL, Server, kill, wait_until
 
-SECRET, OTHER = "whsec_" + "c3VuYm94" * 4, "whsec_" + "b3RoZXIh" * 4
+SECRET, OTHER = CALLBACK_SECRETS
 
 
 @pytest.fixture
-def receiver() -> Iterator[Receiver]:
-    receiver = Receiver()
-    yield receiver
-    receiver.close()
-
-
-@pytest.fixture(scope="module")
-def listening() -> Iterator[Receiver]:
-    receiver = Receiver()
-    yield receiver
-    receiver.close()
-
-
-@pytest.fixture(scope="module")
-def calling(tmp_path_factory: pytest.TempPathFactory, listening: Receiver) -> Iterator[Server]:
+def calling(mortal: Server, listening: Receiver) -> Iterator[Server]:
     """A server that may call `listening`, and signs with two secrets."""
-    folder = tmp_path_factory.mktemp("calling")
-    hosts, secrets = f"{listening.url},http://localhost:{listening.port}", f"{SECRET},{OTHER}"
-    with served(folder, SUNBOX_CALLBACK_HOSTS=hosts, SUNBOX_CALLBACK_SECRET=secrets) as server:
-        yield server
+    yield mortal
+    listening.answer = lambda heard: 204
 
 
 def started(server: Server, url: str, kind: str = "renders", settings: Any = SMALL, **more: Any) -> str:
@@ -80,7 +64,7 @@ def test_a_render_s_end_is_told_and_signed(calling: Server, listening: Receiver)
 
 
 def test_the_python_client_asks_for_callbacks(calling: Server, listening: Receiver) -> None:
-    with Client(calling.url) as client:
+    with Client(calling.url, calling.key) as client:
         id = client.submit(SCENE, "\N{TEAPOT}" * 200, callback=listening.url, **SMALL).id
         over = {"/materials/ball/roughness": [0.5]}
         batch = client.batch(SCENE, over, callback=listening.url, **SMALL).id
@@ -168,25 +152,20 @@ def test_without_hosts_no_callback_is_taken(server: Server) -> None:
     assert server.http.get("/v1/callbacks").json() == []
 
 
-def test_callbacks_outlive_the_server(tmp_path: Path, receiver: Receiver) -> None:
+def test_callbacks_outlive_the_server(calling: Server, listening: Receiver) -> None:
     """One is due again when the server is killed, and the render of another one goes on."""
-    receiver.answer = lambda heard: 503
-    hosts = {"SUNBOX_CALLBACK_HOSTS": receiver.url}
-    first = Server(tmp_path, **hosts)
-    first.wait()
-    due, waiting = started(first, receiver.url), started(first, receiver.url, settings=ENDLESS)
-    wait_until(lambda: listed(first, due)["attempts"])
-    kill(first)
-    receiver.answer = lambda heard: 204
-    with served(tmp_path, **hosts) as second:
-        wait_until(lambda: listed(second, due)["state"] == "delivered")
-        second.http.delete(f"/v1/renders/{waiting}").raise_for_status()
-        wait_until(lambda: listed(second, waiting)["state"] == "delivered")
-        ids = {heard.headers["webhook-id"] for heard in about(receiver, due)}
-        assert ids == {listed(second, due)["id"]}
-        secret = (tmp_path / "data" / "callback.secret").read_text().strip()
-        for heard in receiver.heard:
-            assert Webhook(secret).verify(heard.body, heard.headers)
+    listening.answer = lambda heard: 503
+    due, waiting = started(calling, listening.url), started(calling, listening.url, settings=ENDLESS)
+    wait_until(lambda: listed(calling, due)["attempts"])
+    kill(calling)
+    listening.answer = lambda heard: 204
+    calling.start()
+    wait_until(lambda: listed(calling, due)["state"] == "delivered")
+    calling.http.delete(f"/v1/renders/{waiting}").raise_for_status()
+    wait_until(lambda: listed(calling, waiting)["state"] == "delivered")
+    assert {heard.headers["webhook-id"] for heard in about(listening, due)} == {listed(calling, due)["id"]}
+    for heard in (*about(listening, due), *about(listening, waiting)):
+        assert Webhook(SECRET).verify(heard.body, heard.headers)
 
 
 def filled(folder: Path, subjects: dict[str, str]) -> CallbackRows:

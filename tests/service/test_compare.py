@@ -6,7 +6,6 @@ import copy
 import io
 import json
 from http.client import HTTPConnection
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -16,7 +15,7 @@ from PIL import Image
 
 from service.verdict.figures import displayed
 from tests.calls import is_problem, metrics, pixels, start, status
-from tests.serving import Server, served, wait_until
+from tests.serving import Server, wait_until
 
 BALL: dict[str, Any] = {
     "version": 1,
@@ -252,18 +251,22 @@ def test_a_time_limit_ends_it(http: httpx.Client) -> None:
     assert compare(http, a, b)["samples"]["a"] < 2**20
 
 
-def test_going_away_ends_the_work(tmp_path: Path) -> None:
-    with served(tmp_path) as server:
-        sides = [document(samples=2**24, sampler=each) for each in ("sobol", "independent")]
+def test_going_away_ends_the_work(server: Server) -> None:
+    sides = [document(samples=2**24, sampler=each) for each in ("sobol", "independent")]
 
-        def under_way() -> float:
-            found = metrics(server)
-            return sum(found[f'sunbox_renders{{state="{state}"}}'] for state in ("queued", "running"))
+    def under_way() -> float:
+        found = metrics(server)
+        return sum(found[f'sunbox_renders{{state="{state}"}}'] for state in ("queued", "running"))
 
-        connection = HTTPConnection(server.url.removeprefix("http://"))
-        body = json.dumps({"a": sides[0], "b": sides[1]})
-        connection.request("POST", "/v1/compare", body, {"content-type": "application/json"})
-        wait_until(lambda: under_way() == 2)
-        connection.close()
-        wait_until(lambda: under_way() == 0)
-        wait_until(lambda: not server.http.get("/v1/info").json()["memory"]["used"].get("scenes"))
+    def scenes() -> int:
+        return int(server.http.get("/v1/info").json()["memory"]["used"].get("scenes", 0))
+
+    wait_until(lambda: under_way() == 0)  # what other tests have begun
+    before = scenes()
+    connection = HTTPConnection(server.url.removeprefix("http://"))
+    body = json.dumps({"a": sides[0], "b": sides[1]})
+    connection.request("POST", "/v1/compare", body, {"content-type": "application/json"})
+    wait_until(lambda: under_way() == 2)
+    connection.close()
+    wait_until(lambda: under_way() == 0)
+    wait_until(lambda: scenes() <= before)

@@ -6,8 +6,6 @@ import asyncio
 import json
 import socket
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -28,37 +26,16 @@ from tests.asset_files import OBJ
 from tests.calls import is_problem
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Client, Server
 
-ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}
+ANNA, BERT = {"authorization": "Bearer anna-key"}, {"authorization": "bearer  bert-key"}
 BODY = {"scene": SCENE, "settings": SMALL}
 
 
-@pytest.fixture(scope="module")
-def keyed(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server with keys and narrow limits; asking for `server` first: they share what that has cached."""
-    variables = {
-        "SUNBOX_API_KEY": "anna-1, bert-2",
-        "SUNBOX_MAX_RUNNING": "1",
-        "SUNBOX_MAX_QUEUE": "2",
-        "SUNBOX_MAX_JOBS": "2",
-        "SUNBOX_KEEP_RENDERS": "2",
-        "SUNBOX_MAX_BODY": "4000",
-        "SUNBOX_MAX_KEY_ASSETS": "16384",
-        "SUNBOX_BODY_TIMEOUT": "0.5",
-        "SUNBOX_MAX_SECONDS": "5",
-        "SUNBOX_ALLOWED_ORIGINS": "https://friend.example",
-    }
-    served = Server(tmp_path_factory.mktemp("keyed"), **variables)
-    served.wait()
-    yield served
-    assert served.stop() == 0
-
-
 @pytest.fixture
-def http(keyed: Server) -> httpx.Client:
-    return keyed.http
+def http(strict: Server) -> httpx.Client:
+    return strict.http
 
 
-@pytest.mark.parametrize("shown", [{}, {"authorization": "Bearer wrong"}, {"authorization": "Basic anna-1"}])
+@pytest.mark.parametrize("shown", [{}, {"authorization": "Bearer wrong"}, {"authorization": "Basic anna-key"}])
 def test_a_key_is_asked_for(http: httpx.Client, shown: dict[str, str]) -> None:
     for method, address in (("GET", "/v1/info"), ("POST", "/v1/renders"), ("GET", "/v1/renders/x"), ("GET", "/v1")):
         answer = http.request(method, address, headers=shown)
@@ -70,20 +47,24 @@ def test_a_key_is_asked_for(http: httpx.Client, shown: dict[str, str]) -> None:
 
 
 def test_renders_belong_to_their_key(http: httpx.Client) -> None:
-    answer = http.post("/v1/renders", json=BODY, headers=ANNA)
-    address = "/v1/" + answer.headers["location"]
-    assert http.get(address, params={"wait": PATIENCE_S}, headers=ANNA).json()["state"] == "done"
+    def ended() -> str:
+        answer = http.post("/v1/renders", json={**BODY, "label": "annas"}, headers=ANNA, params={"wait": PATIENCE_S})
+        assert answer.json()["state"] == "done"
+        return f"/v1/{answer.headers['location']}"
+
+    address = ended()
     for method, under in (("GET", ""), ("DELETE", ""), ("GET", "/image")):
         assert is_problem(http.request(method, address + under, headers=BERT), 404)
     assert http.get(address + "/image", headers=ANNA).status_code == 200
-    assert http.get("/v1/renders", headers=BERT).json() == []
-    assert [render["id"] for render in http.get("/v1/renders", headers=ANNA).json()] == [answer.json()["id"]]
+    listed = {"label": "annas"}
+    assert http.get("/v1/renders", headers=BERT, params=listed).json() == []
+    found = http.get("/v1/renders", headers=ANNA, params=listed).json()
+    assert [f"/v1/renders/{render['id']}" for render in found] == [address]
     for _ in range(2):
         http.post("/v1/render", json=BODY, headers=ANNA)  # not kept, and makes nobody go
     assert http.get(address, headers=ANNA).status_code == 200
-    newer = [http.post("/v1/renders", json=BODY, headers=ANNA).headers["location"] for _ in range(2)]
-    for location in newer:
-        http.get(f"/v1/{location}", params={"wait": PATIENCE_S}, headers=ANNA)
+    for _ in range(int(http.get("/v1/info", headers=ANNA).json()["limits"]["keep_renders"])):
+        ended()
     assert is_problem(http.get(address, headers=ANNA), 410)
     assert is_problem(http.get(address, headers=BERT), 404)
 
@@ -115,14 +96,14 @@ def test_time_has_its_limit(http: httpx.Client) -> None:
 @pytest.mark.parametrize(
     ("protocols", "headers", "welcome"),
     [
-        (["sunbox.v1", "sunbox.key.anna-1"], {}, True),
+        (["sunbox.v1", "sunbox.key.anna-key"], {}, True),
         (["sunbox.v1"], BERT, True),
         (["sunbox.key.wrong", "sunbox.v1"], {}, False),
         (["sunbox.v1"], {}, False),
     ],
 )
-def test_a_stream_shows_its_key(keyed: Server, protocols: list[str], headers: Any, welcome: bool) -> None:
-    address = keyed.url.replace("http", "ws") + "/v1/stream"
+def test_a_stream_shows_its_key(strict: Server, protocols: list[str], headers: Any, welcome: bool) -> None:
+    address = strict.url.replace("http", "ws") + "/v1/stream"
     offered = [Subprotocol(protocol) for protocol in protocols]
     with connect(address, subprotocols=offered, additional_headers=headers) as stream:
         assert stream.subprotocol == "sunbox.v1"
@@ -160,31 +141,49 @@ def test_a_page_of_a_friend_reads_answers(http: httpx.Client) -> None:
     assert "access-control-allow-origin" not in stranger.headers and stranger.status_code >= 400
 
 
-def test_a_body_that_stops_is_ended(keyed: Server) -> None:
-    address = urlsplit(keyed.url)
+def test_a_body_that_stops_is_ended(strict: Server) -> None:
+    address = urlsplit(strict.url)
     with socket.create_connection((address.hostname, address.port), 60) as connection:
-        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nAuthorization: Bearer anna-1\r\n"
+        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nAuthorization: Bearer anna-key\r\n"
         connection.sendall(f"{head}Content-Length: 100\r\n\r\nonly this".encode())
         assert b" 408 " in connection.recv(1000)
 
 
-def test_the_disk_has_its_quota(tmp_path: Path) -> None:
-    served = Server(tmp_path, SUNBOX_DATA_QUOTA="200000")
-
-    def post(size: int) -> httpx.Response:
-        return served.http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)))
-
-    try:
-        assert is_problem(post(210_000), 413)
-        first, second, third = (post(size) for size in (60_000, 60_100, 60_200))
-        assert {answer.status_code for answer in (first, second, third)} == {201}
-        assert is_problem(served.http.get(f"/v1/assets/{first.json()['id']}"), 404)
-        assert served.http.get(f"/v1/assets/{third.json()['id']}").status_code == 200
-    finally:
-        assert served.stop() == 0
+def test_announced_bodies_are_refused_unread(strict: Server) -> None:
+    address = urlsplit(strict.url)
+    with socket.create_connection((address.hostname, address.port), 5) as connection:
+        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nAuthorization: Bearer anna-key\r\n"
+        connection.sendall(f"{head}Content-Length: 4001\r\n\r\n".encode())
+        assert b" 413 " in connection.recv(100)
 
 
-def test_no_address_in_a_document_is_asked(keyed: Server) -> None:
+def test_unannounced_bodies_are_counted(http: httpx.Client) -> None:
+    answer = http.post("/v1/assets", content=iter([b"x" * 1000] * 5), headers=ANNA)
+    assert is_problem(answer, 413)
+    assert http.post("/v1/assets", content=iter([OBJ]), headers=ANNA).status_code == 201
+
+
+def test_compressed_bodies_are_not_taken(http: httpx.Client) -> None:
+    assert is_problem(http.post("/v1/assets", content=OBJ, headers={**ANNA, "content-encoding": "gzip"}), 415)
+
+
+def test_pixels(http: httpx.Client) -> None:
+    large = {"scene": SCENE, "settings": {"width": 40, "height": 26}}
+    answer = http.post("/v1/renders", json=large, headers=ANNA)
+    assert is_problem(answer, 422, "/settings/width")
+    assert http.get("/v1/info", headers=ANNA).json()["limits"]["max_pixels"] == 1000
+
+
+def test_allowed_origins(http: httpx.Client) -> None:
+    for origin in ("https://friend.example", "http://other.example:81"):
+        answer = http.post("/v1/assets", content=OBJ, headers={**ANNA, "origin": origin})
+        assert answer.status_code == 201 and answer.headers["access-control-allow-origin"] == origin
+    assert http.get("/v1/info", headers={**ANNA, "host": "friend.example"}).status_code == 200
+    stranger = {**ANNA, "origin": "http://friend.example"}
+    assert is_problem(http.post("/v1/assets", content=OBJ, headers=stranger), 403)
+
+
+def test_no_address_in_a_document_is_asked(strict: Server) -> None:
     with socket.create_server(("127.0.0.1", 0)) as trap:
         trap.settimeout(0.3)
         url = f"http://127.0.0.1:{trap.getsockname()[1]}/secret.exr"
@@ -195,10 +194,10 @@ def test_no_address_in_a_document_is_asked(keyed: Server) -> None:
             "/scene/textures/t/asset": {"textures": {"t": {"asset": url}}},
         }
         for pointer, change in places.items():
-            answer = keyed.http.post("/v1/renders", json={"scene": {**SCENE, **change}}, headers=ANNA)
+            answer = strict.http.post("/v1/renders", json={**BODY, "scene": {**SCENE, **change}}, headers=ANNA)
             errors = [error["pointer"] for error in answer.json().get("errors", [])]
             assert (answer.status_code == 422 and errors == [pointer]) or "textures" in pointer
-        keyed.http.post("/v1/assets", content=gltf, headers=ANNA)
+        strict.http.post("/v1/assets", content=gltf, headers=ANNA)
         with pytest.raises(TimeoutError):
             trap.accept()
 
@@ -311,15 +310,21 @@ def test_saved_documents_are_their_key_s(http: httpx.Client) -> None:
 
 
 def test_a_key_s_assets_have_a_bound(http: httpx.Client) -> None:
-    """Two small ones: the first makes room for the third, and the other key's stays."""
-    ids = [http.post("/v1/assets", content=OBJ + b"#" * n, headers=ANNA).json()["id"] for n in range(2)]
-    other = http.post("/v1/assets", content=OBJ + b"#" * 9, headers=BERT).json()["id"]
-    time.sleep(0.02)  # file systems write times in steps
-    assert http.get(f"/v1/assets/{ids[1]}", headers=ANNA).status_code == 200  # used last
-    ids.append(http.post("/v1/assets", content=OBJ + b"#" * 2, headers=ANNA).json()["id"])
-    found = [http.get(f"/v1/assets/{id}", headers=ANNA).status_code for id in ids]
-    assert found == [404, 200, 200]
-    assert http.get(f"/v1/assets/{other}", headers=BERT).status_code == 200
+    """Eight small ones: the one that was used longest ago makes room, and the other key's stays."""
+
+    def uploaded(comment: str, key: dict[str, str]) -> str:
+        answer = http.post("/v1/assets", content=OBJ + comment.encode(), headers=key).raise_for_status()
+        return str(answer.json()["id"])
+
+    def found(id: str, key: dict[str, str] = ANNA) -> int:
+        return http.get(f"/v1/assets/{id}", headers=key).status_code
+
+    first, used, other = uploaded("# 1", ANNA), uploaded("# 2", ANNA), uploaded("# 3", BERT)
+    for number in range(8):
+        time.sleep(0.02)  # file systems write times in steps
+        assert found(used) == 200
+        last = uploaded(f"# more {number}", ANNA)
+    assert [found(id) for id in (first, used, last)] == [404, 200, 200] and found(other, BERT) == 200
 
 
 @pytest.mark.parametrize("steps", range(6))

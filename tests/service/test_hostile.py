@@ -27,7 +27,7 @@ from service import presets
 from service.routes.examples import SCENE
 from tests import asset_files as make
 from tests.hostile import mutated_bytes, mutated_document, mutated_json
-from tests.serving import Server, client
+from tests.serving import KEYS, Client, Server
 
 DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 80))
 FILES = int(os.environ.get("HOSTILE_FILES", 30))
@@ -42,6 +42,7 @@ CHECKS = [
 ]
 PATIENCE_S = float(os.environ.get("HOSTILE_PATIENCE", 180))  # a later answer counts as none
 AT_ONCE = 8
+KEY = {"authorization": f"Bearer {KEYS[0]}"}
 GROWTH = 150 << 20  # bytes: allocators, kernels and parsed assets, each of which has its bound
 ENOUGH = 300  # documents: half of them fill the cache of kernels
 SMALL = {"width": 8, "height": 8, "max_samples": 2}
@@ -81,7 +82,7 @@ EVERYTHING: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def modest(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server with narrow limits. It must be there in the end, and go in good order."""
+    """A server of its own, whose memory nobody else uses, with narrow limits but those of bodies."""
     served = Server(tmp_path_factory.mktemp("modest"), **LIMITS)
     served.wait()
     yield served
@@ -220,10 +221,10 @@ def _used(server: Server, asset: dict[str, Any]) -> int:
     return answer.status_code
 
 
-def test_mutated_messages(modest: Server) -> None:
+def test_mutated_messages(strict: Server) -> None:
     """The stream answers each with errors or frames, and goes on."""
     rng = random.Random(SEED)
-    with client(modest) as stream:
+    with Client(strict.url, key=KEYS[0]) as stream:
         stream.start(generation=1, scene=EVERYTHING, settings=SMALL, view={"format": "png", "max_fps": 30})
         for i in range(max(50, DOCUMENTS // 10)):
             patch = mutated_document({"materials": EVERYTHING["materials"], "shapes": EVERYTHING["shapes"]}, rng)
@@ -236,8 +237,8 @@ def test_mutated_messages(modest: Server) -> None:
 
 
 @pytest.fixture(scope="module")
-def api(modest: Server) -> Any:
-    return schemathesis.openapi.from_url(f"{modest.url}/openapi.json")
+def api(strict: Server) -> Any:
+    return schemathesis.openapi.from_url(f"{strict.url}/openapi.json")
 
 
 def test_whatever_is_described(api: Any) -> None:
@@ -259,7 +260,7 @@ def test_whatever_is_described(api: Any) -> None:
         def ask(case: Any) -> None:
             nonlocal asked
             asked += 1
-            case.call_and_validate(checks=CHECKS, timeout=PATIENCE_S)
+            case.call_and_validate(checks=CHECKS, timeout=PATIENCE_S, headers=KEY)
 
         ask()
     assert asked > 18 * EXAMPLES / 2

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextvars import copy_context
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,8 @@ from service.system import memory
 from service.system.memory import Limit, MemoryBudget, machine_memory
 from service.system.turns import CALLER
 from service.worker.device.memory import UNLIMITED, default_limit
-from tests.serving import PATIENCE_S, SCENE, Client, Server, served
+from tests.calls import metrics
+from tests.serving import PATIENCE_S, SCENE, Client, Server, served, wait_until
 
 
 class Work:
@@ -246,19 +246,25 @@ def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     bodies.close()
 
 
-def test_a_server_says_what_it_holds(tmp_path: Path) -> None:
-    with served(tmp_path, SUNBOX_MEMORY=str(64 * MIB)) as server, Client(server.url) as client:
+@pytest.fixture(scope="module")
+def tight(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server that has so little memory that few other tests could pass with it."""
+    with served(tmp_path_factory.mktemp("tight"), SUNBOX_MEMORY=str(96 * MIB)) as server:
+        yield server
+
+
+def test_a_server_says_what_it_holds(tight: Server) -> None:
+    with Client(tight.url) as client:
         assert client.until("hello")
         client.start(settings={"width": 128, "height": 64, "max_samples": 1})
         client.finished()
-        info = server.http.get("/v1/info").json()
-        assert info["memory"]["limit"] == info["renderer"]["memory_limit"] == 64 * MIB
+        info = tight.http.get("/v1/info").json()
+        assert info["memory"]["limit"] == info["renderer"]["memory_limit"] == 96 * MIB
         assert info["memory"]["used"]["pictures"] == 128 * 64 * RENDERED_PIXEL_BYTES
-        lines = (line.rpartition(" ") for line in server.http.get("/metrics").text.splitlines())
-        metrics = {name: value for name, _, value in lines}
-        assert float(metrics['sunbox_memory_bytes{owner="pictures"}']) == 128 * 64 * RENDERED_PIXEL_BYTES
-        assert float(metrics["sunbox_memory_limit_bytes"]) == 64 * MIB
-        client.start(2, settings={"width": 1024, "height": 1024, "max_samples": 1})
+        found = metrics(tight)
+        assert found['sunbox_memory_bytes{owner="pictures"}'] == 128 * 64 * RENDERED_PIXEL_BYTES
+        assert found["sunbox_memory_limit_bytes"] == 96 * MIB
+        client.start(2, settings={"width": 1200, "height": 1024, "max_samples": 1})
         told = client.until("error")[0]
         assert told["generation"] == 2 and told["problem"]["status"] == 413
         assert "SUNBOX_MEMORY" in told["problem"]["detail"]
@@ -269,36 +275,29 @@ def test_the_session_server_is_within_its_memory(server: Server) -> None:
     assert sum(info["memory"]["used"].values()) < info["memory"]["limit"] == MemoryBudget().limit
 
 
-def test_renders_wait_for_memory(tmp_path: Path) -> None:
+def test_renders_wait_for_memory(tight: Server) -> None:
     """A stored one goes on when there is some; who waits for the answer is told to come again."""
 
     def body(size: int, samples: int) -> dict[str, Any]:
         return {"scene": SCENE, "settings": {"width": size, "height": size, "max_samples": samples}}
 
     def pictures() -> int:
-        return int(server.http.get("/v1/info").json()["memory"]["used"]["pictures"])
+        return int(tight.http.get("/v1/info").json()["memory"]["used"]["pictures"])
 
+    stream = pictures()  # that may come back
     each = 500 * 500 * (RENDERED_PIXEL_BYTES + SAVED_PIXEL_BYTES)
-    with served(tmp_path, SUNBOX_MEMORY=str(96 * MIB)) as server:
-        for route in ("/v1/renders", "/v1/render"):
-            refused = server.http.post(route, json=body(1024, 1))
-            assert refused.status_code == 413 and "SUNBOX_MEMORY" in refused.json()["detail"]
-        first = server.http.post("/v1/renders", json=body(500, 1 << 24)).json()["id"]
-        wait_until(lambda: server.http.get(f"/v1/renders/{first}").json()["samples"] > 0)
-        second = server.http.post("/v1/renders", json=body(500, 1)).json()["id"]
-        refused = server.http.post("/v1/render", json=body(500, 1))
-        assert refused.status_code == 503 and int(refused.headers["retry-after"]) > 0
-        assert pictures() == each
-        assert server.http.get(f"/v1/renders/{second}").json()["state"] == "queued"
-        server.http.delete(f"/v1/renders/{first}")  # it rests with the renderer, and makes room
-        assert server.http.get(f"/v1/renders/{second}?wait={PATIENCE_S}").json()["state"] == "done"
-        assert pictures() == each
-        for id in (first, second):  # from the disk, one after the other
-            assert server.http.get(f"/v1/renders/{id}/image").status_code == 200
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    until = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    for route in ("/v1/renders", "/v1/render"):
+        refused = tight.http.post(route, json=body(1024, 1))
+        assert refused.status_code == 413 and "SUNBOX_MEMORY" in refused.json()["detail"]
+    first = tight.http.post("/v1/renders", json=body(500, 1 << 24)).json()["id"]
+    wait_until(lambda: tight.http.get(f"/v1/renders/{first}").json()["samples"] > 0)
+    second = tight.http.post("/v1/renders", json=body(500, 1)).json()["id"]
+    refused = tight.http.post("/v1/render", json=body(500, 1))
+    assert refused.status_code == 503 and int(refused.headers["retry-after"]) > 0
+    assert pictures() == stream + each
+    assert tight.http.get(f"/v1/renders/{second}").json()["state"] == "queued"
+    tight.http.delete(f"/v1/renders/{first}")  # it rests with the renderer, and makes room
+    assert tight.http.get(f"/v1/renders/{second}?wait={PATIENCE_S}").json()["state"] == "done"
+    assert pictures() == stream + each
+    for id in (first, second):  # from the disk, one after the other
+        assert tight.http.get(f"/v1/renders/{id}/image").status_code == 200

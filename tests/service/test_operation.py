@@ -24,7 +24,7 @@ from service.logs import setup
 from service.routes.metrics import scrape
 from service.state import AppState
 from tests.calls import metrics
-from tests.serving import ENDLESS, SCENE, SMALL, Server, client, wait_until
+from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, client, wait_until
 
 ROOT = Path(__file__).parents[2]
 
@@ -79,23 +79,20 @@ def test_requests_have_ids(server: Server) -> None:
     assert ours[0] != ours[1] and "good" not in ours[0]
 
 
-def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
+def test_logs_for_machines(strict: Server) -> None:
     """Every line is an object, the renderer's process included; a refusal bears its request's id and no secret."""
-    variables = {"SUNBOX_LOG_FORMAT": "json", "SUNBOX_API_KEY": "very-secret"}
-    talking = Server(tmp_path, **variables)
-    talking.wait()
-    key = {"authorization": "Bearer very-secret", "x-request-id": "mine"}
-    assert talking.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL}, headers=key).status_code == 200
-    talking.http.get("/v1/info?key=very-secret%0a")
-    assert talking.stop() == 0
-    text = (tmp_path / "server.log").read_text()
-    lines = [json.loads(line) for line in text.splitlines()]
+    key = {"authorization": f"Bearer {KEYS[0]}", "x-request-id": "mine"}
+    assert strict.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL}, headers=key).status_code == 200
+    strict.http.get(f"/v1/info?key={KEYS[0]}%0a")
+    wait_until(lambda: '"request": "mine"' in strict.log.read_text())
+    text = strict.log.read_text()
+    lines = [json.loads(line) for line in text[: text.rindex("\n")].splitlines()]
     (answered,) = (line for line in lines if line.get("request") == "mine" and line["event"] == "answered")
     assert (answered["method"], answered["path"], answered["status"]) == ("POST", "/v1/render", 200)
     assert answered["ms"] > 0 and answered["level"] == "info" and answered["timestamp"].endswith("Z")
     created = [line for line in lines if line["logger"] == "gpu.context"]  # by the renderer's process
     assert [line["renderer"] for line in created] == ["0"] and created[0]["driver"]
-    assert "very-secret" not in text
+    assert KEYS[0] not in text
 
 
 def test_a_software_renderer_is_refused(server: Server, tmp_path: Path) -> None:

@@ -6,11 +6,11 @@ import hashlib
 import io
 import os
 import signal
-import socket
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import product
 from pathlib import Path
-from typing import Any
 from urllib.parse import urljoin, urlsplit
 
 import httpx
@@ -74,22 +74,19 @@ def test_the_same_request_gives_the_same_bits(http: httpx.Client) -> None:
     assert all(np.array_equal(first, other) for other in others)
 
 
-@pytest.mark.parametrize(
-    ("format", "mime"),
-    [
-        ("png", "image/png"),
-        ("jpeg", "image/jpeg"),
-        ("webp", "image/webp"),
-        ("exr", "image/x-exr"),
-        ("hdr", "image/vnd.radiance"),
-        ("npy", "application/octet-stream"),
-    ],
-)
-@pytest.mark.parametrize("aov", ["color", "albedo", "normal", "depth", "variance", "shape_id"])
-def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str, mime: str, aov: str) -> None:
-    answer = http.get(f"/v1/renders/{running}/image", params={"format": format, "aov": aov})
-    assert answer.status_code == 200 and answer.headers["content-type"] == mime
-    assert len(answer.content) > 50  # the WebP of a picture that is black but for one pixel has 64
+def test_every_format_of_every_aov(http: httpx.Client, running: str) -> None:
+    types = {
+        "png": "image/png",
+        "jpeg": "image/jpeg",
+        "webp": "image/webp",
+        "exr": "image/x-exr",
+        "hdr": "image/vnd.radiance",
+        "npy": "application/octet-stream",
+    }
+    for aov, (format, mime) in product(("color", "albedo", "normal", "depth", "variance", "shape_id"), types.items()):
+        answer = http.get(f"/v1/renders/{running}/image", params={"format": format, "aov": aov})
+        assert answer.status_code == 200 and answer.headers["content-type"] == mime, (format, aov)
+        assert len(answer.content) > 50, (format, aov)  # the WebP that is black but for one pixel has 64
 
 
 def test_image_shapes_and_depths(http: httpx.Client) -> None:
@@ -121,9 +118,8 @@ def test_displayed_colours_go_through_a_cube(http: httpx.Client, running: str) -
     assert is_problem(http.post("/v1/render?lut=x", json={"scene": SCENE}), 422, "/lut")
 
 
-@pytest.mark.parametrize(
-    ("query", "name"),
-    [
+def test_bad_image_queries(http: httpx.Client, running: str) -> None:
+    for query, name in (
         ("bits=12", "bits"),
         ("bits=16&format=jpeg", "bits"),
         ("format=gif", "format"),
@@ -136,11 +132,12 @@ def test_displayed_colours_go_through_a_cube(http: httpx.Client, running: str) -
         ("format=avif&tone_map=ocio:Rec.2100-PQ - Display/Raw", "tone_map"),
         ("tone_map=ocio:sRGB - Display/ACES 1.0", "tone_map"),
         ("tonemap=aces", "tonemap"),
-    ],
-)
-def test_bad_image_queries(http: httpx.Client, running: str, query: str, name: str) -> None:
-    assert is_problem(http.get(f"/v1/renders/{running}/image?{query}"), 422, f"/{name}")
-    assert is_problem(http.post(f"/v1/render?{query}", json={"scene": SCENE}), 422, f"/{name}")
+    ):
+        for answer in (
+            http.get(f"/v1/renders/{running}/image?{query}"),
+            http.post(f"/v1/render?{query}", json={"scene": SCENE}),
+        ):
+            assert is_problem(answer, 422, f"/{name}"), query
 
 
 def test_cancelling(http: httpx.Client, running: str) -> None:
@@ -195,19 +192,11 @@ def test_bad_bodies(http: httpx.Client, address: str, body: bytes, status: int, 
     assert "NaN" not in answer.text or status == 422
 
 
-@pytest.mark.parametrize(
-    ("change", "pointer"),
-    [
-        (
-            {"materials": {"ball": {"type": "diffuse", "albedo": 2}, "floor": {"type": "disney"}}},
-            "/scene/materials/ball/albedo",
-        ),
-        ({"environment": {"type": "image", "asset": "sha256:" + "0" * 64}}, "/scene/environment/asset"),
-        ({"fog": {}}, "/scene/fog"),
-    ],
-)
-def test_bad_scenes(http: httpx.Client, change: dict[str, Any], pointer: str) -> None:
-    assert is_problem(http.post("/v1/renders", json={"scene": {**SCENE, **change}}), 422, pointer)
+def test_a_mistake_of_a_scene_is_pointed_at(http: httpx.Client) -> None:
+    """Which there are and what is said of each, `tests/service/scene/test_refusals.py` has."""
+    materials = {"ball": {"type": "diffuse", "albedo": 2}, "floor": {"type": "disney"}}
+    answer = http.post("/v1/renders", json={"scene": {**SCENE, "materials": materials}})
+    assert is_problem(answer, 422, "/scene/materials/ball/albedo")
 
 
 def test_what_is_not_there(http: httpx.Client) -> None:
@@ -315,68 +304,36 @@ def test_own_origin_may(server: Server) -> None:
     assert answer.status_code == 201
 
 
-@pytest.fixture(scope="module")
-def strict(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("strict")
-    origins = "https://friend.example, http://other.example:81"
-    limits = {"SUNBOX_MAX_BODY": "4000", "SUNBOX_MAX_PIXELS": "1000", "SUNBOX_ALLOWED_ORIGINS": origins}
-    served = Server(folder, **limits)
-    served.wait()
-    yield served
-    served.process.kill()
-
-
-def test_announced_bodies_are_refused_unread(strict: Server) -> None:
-    address = urlsplit(strict.url)
-    with socket.create_connection((address.hostname, address.port), 5) as connection:
-        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: 4001\r\n\r\n"
-        connection.sendall(head.encode())
-        assert b" 413 " in connection.recv(100)
-
-
-def test_unannounced_bodies_are_counted(strict: Server) -> None:
-    answer = strict.http.post("/v1/assets", content=iter([b"x" * 1000] * 5))
-    assert is_problem(answer, 413)
-    assert strict.http.post("/v1/assets", content=iter([OBJ])).status_code == 201
-
-
-def test_compressed_bodies_are_not_taken(strict: Server) -> None:
-    assert is_problem(strict.http.post("/v1/assets", content=OBJ, headers={"content-encoding": "gzip"}), 415)
-
-
-def test_pixels(strict: Server) -> None:
-    answer = strict.http.post("/v1/renders", json={"scene": SCENE, "settings": {"width": 40, "height": 26}})
-    assert is_problem(answer, 422, "/settings/width")
-    assert strict.http.get("/v1/info").json()["limits"]["max_pixels"] == 1000
-
-
-def test_allowed_origins(strict: Server) -> None:
-    for origin in ("https://friend.example", "http://other.example:81"):
-        answer = strict.http.post("/v1/assets", content=OBJ, headers={"origin": origin})
-        assert answer.status_code == 201 and answer.headers["access-control-allow-origin"] == origin
-    assert strict.http.get("/v1/info", headers={"host": "friend.example"}).status_code == 200
-    assert is_problem(strict.http.post("/v1/assets", content=OBJ, headers={"origin": "http://friend.example"}), 403)
-
-
-def test_the_end(strict: Server) -> None:
-    """Clients are told, nobody waits, nothing stays."""
-    children = strict.children()
+def test_the_end_is_told_to_all_and_leaves_nothing(mortal: Server) -> None:
+    """Streams and events end, nobody waits, and no process stays, nor an error in the log; also where the server is
+    told several times in a row, as `timeout` does it."""
+    id = start(mortal.http, ENDLESS)["id"]
+    wait_until(lambda: status(mortal.http, id)["samples"] > 0)
+    children, before = mortal.children(), len(mortal.log.read_text())
     assert children
-    with opened(strict) as stream:
-        stream.start(settings={**ENDLESS, "width": 30})
+    with ExitStack() as stack:
+        stream = stack.enter_context(opened(mortal))
+        stream.start(settings=ENDLESS)
         stream.frame()
-        assert strict.stop(signal.SIGTERM) == 0
+        paths = (f"/v1/renders/{id}/events", "/v1/renders/events")
+        events = [stack.enter_context(mortal.http.stream("GET", path)).iter_lines() for path in paths]
+        assert [next(lines) for lines in events] == ["event: progress"] * 2
+        for number in (signal.SIGTERM, *[signal.SIGINT] * 4):
+            mortal.process.send_signal(number)
+            time.sleep(0.002)
+        assert mortal.process.wait(PATIENCE_S) == 0
+        assert not any("event: done" in lines for lines in events)
         with pytest.raises(ConnectionClosed) as closed:
             stream.until("never")
         assert closed.value.rcvd is not None and closed.value.rcvd.code == 1001
-    assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
+    wait_until(lambda: not [pid for pid in children if Path(f"/proc/{pid}").exists()])
+    log = mortal.log.read_text()[before:]
+    assert "session ended" in log and "Traceback" not in log and "error" not in log, log
 
 
-def test_children_end_when_the_server_is_killed(server: Server, tmp_path: Path) -> None:
-    doomed = Server(tmp_path)
-    doomed.wait()
-    children = doomed.children()
+def test_children_end_when_the_server_is_killed(mortal: Server) -> None:
+    children = mortal.children()
     assert children
-    os.kill(doomed.process.pid, signal.SIGKILL)
-    doomed.process.wait()
+    os.kill(mortal.process.pid, signal.SIGKILL)
+    mortal.process.wait()
     wait_until(lambda: not [pid for pid in children if Path(f"/proc/{pid}").exists()])

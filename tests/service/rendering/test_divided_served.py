@@ -4,26 +4,13 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from gpu import Renderer
 from tests.serving import PATIENCE_S, SCENE, Client, Server
 
 SETTINGS = {"width": 96, "height": 80, "max_samples": 200, "seed": 9}
-
-
-@pytest.fixture(scope="module")
-def two(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    server = Server(tmp_path_factory.mktemp("two"), SUNBOX_DEVICES="llvmpipe:2")
-    until = time.monotonic() + PATIENCE_S
-    while any(each["state"] != "ready" for each in server.http.get("/v1/info").json()["renderers"]):
-        assert time.monotonic() < until
-        time.sleep(0.05)
-    yield server
-    server.stop()
 
 
 def _leases(server: Server) -> float:

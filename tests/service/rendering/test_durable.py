@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-import signal
 import sqlite3
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,30 +24,27 @@ from service.renders.store.store import RenderStore
 from service.requests.request_parser import folded
 from service.scene import parse_settings
 from service.storage.database import FILE
-from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, kill, wait_until
-from tests.serving import Server as AnyServer
+from tests.serving import ENDLESS, KEYS, PATIENCE_S, SCENE, SMALL, Server, kill, wait_until
 
-Server = partial(AnyServer)
-OFTEN = {"SUNBOX_CHECKPOINT_S": "0.1", "SUNBOX_MAX_RUNNING": "1"}
-LONG = {"width": 96, "height": 96, "max_samples": 1500, "seed": 3}
-ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}
+LONG = {"width": 96, "height": 96, "max_samples": 800, "seed": 3}
+ANNA, BERT = ({"authorization": f"Bearer {key}"} for key in KEYS)
 
 
-def start(server: AnyServer, settings: Any = SMALL, headers: Any = None, **more: Any) -> str:
+def start(server: Server, settings: Any = SMALL, headers: Any = None, **more: Any) -> str:
     body = {"scene": SCENE, "settings": settings, **more}
     return str(server.http.post("/v1/renders", json=body, headers=headers).raise_for_status().json()["id"])
 
 
-def status(server: AnyServer, id: str, wait: float = 0) -> dict[str, Any]:
+def status(server: Server, id: str, wait: float = 0) -> dict[str, Any]:
     found: dict[str, Any] = server.http.get(f"/v1/renders/{id}", params={"wait": wait}).raise_for_status().json()
     return found
 
 
-def pixels(server: AnyServer, id: str, aov: str = "color") -> bytes:
+def pixels(server: Server, id: str, aov: str = "color") -> bytes:
     return server.http.get(f"/v1/renders/{id}/image?format=npy&aov={aov}").raise_for_status().content
 
 
-def until_samples(server: AnyServer, id: str, samples: int) -> dict[str, Any]:
+def until_samples(server: Server, id: str, samples: int) -> dict[str, Any]:
     by = time.monotonic() + PATIENCE_S
     while (found := status(server, id))["samples"] < samples:
         assert time.monotonic() < by and found["state"] in ("queued", "running"), found
@@ -58,82 +52,75 @@ def until_samples(server: AnyServer, id: str, samples: int) -> dict[str, Any]:
     return found
 
 
-def until_checkpoint(folder: Path, id: str) -> None:
-    wait_until((folder / "data" / "renders" / f"{id}.checkpoint").exists)
+def until_checkpoint(server: Server, id: str) -> None:
+    wait_until((server.folder / "data" / "renders" / f"{id}.checkpoint").exists)
 
 
 @pytest.fixture(scope="module")
-def undisturbed(server: AnyServer) -> bytes:
+def undisturbed(server: Server) -> bytes:
     """The picture of LONG from a server that nobody kills."""
     id = start(server, LONG)
     assert status(server, id, PATIENCE_S)["state"] == "done"
     return pixels(server, id)
 
 
-def annas(folder: Path) -> AnyServer:
-    """A server for one key. Without keys each render is a client of its own, and on a slow machine gives way to those
-    that have waited for ten seconds."""
-    served = Server(folder, SUNBOX_API_KEY="anna", **OFTEN)
-    served.http.headers.update(ANNA)
-    return served
-
-
-def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: bytes, tmp_path: Path) -> None:
-    first = annas(tmp_path)
-    done = start(first, label="mine", priority=3)
-    told = status(first, done, PATIENCE_S)
+def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: bytes, mortal: Server) -> None:
+    done = start(mortal, label="mine", priority=3)
+    told = status(mortal, done, PATIENCE_S)
     assert told["state"] == "done" and (told["label"], told["priority"]) == ("mine", 3)
     times = [datetime.fromisoformat(told[name]) for name in ("created", "started", "ended")]
     assert times == sorted(times) and abs((times[2] - datetime.now(UTC)).total_seconds()) < 600
-    seen = {aov: pixels(first, done, aov) for aov in ("color", "variance", "normal")}
-    running = start(first, LONG)
-    queued = [start(first, {**SMALL, "seed": seed}) for seed in range(3)]
-    waits = status(first, queued[0])
+    seen = {aov: pixels(mortal, done, aov) for aov in ("color", "variance", "normal")}
+    old = start(mortal)
+    assert status(mortal, old, PATIENCE_S)["state"] == "done"
+    running = start(mortal, LONG)
+    queued = [start(mortal, {**SMALL, "seed": seed}) for seed in range(3)]
+    waits = status(mortal, queued[0])
     assert (waits["started"], waits["ended"]) == (None, None) and waits["created"] >= told["ended"]
-    until_checkpoint(tmp_path, running)
-    before = until_samples(first, running, 100)
-    kill(first)
+    until_checkpoint(mortal, running)
+    before = until_samples(mortal, running, 100)
+    kill(mortal)
 
-    second = annas(tmp_path)
-    assert status(second, done) == told
-    after = status(second, running)
+    with closing(sqlite3.connect(mortal.folder / "data" / FILE)) as file, file:  # time counts while it is down
+        file.execute("UPDATE renders SET ended_at = ended_at - 90000 WHERE id = ?", (old,))
+    mortal.start()
+    assert mortal.http.get(f"/v1/renders/{old}").status_code == 410
+    assert status(mortal, done) == told
+    after = status(mortal, running)
     assert after["samples"] > 0 and before["elapsed_s"] - after["elapsed_s"] < 10
-    assert {aov: pixels(second, done, aov) for aov in seen} == seen  # brought back from the disk
-    gone_on = until_samples(second, running, after["samples"] + 50)
+    assert {aov: pixels(mortal, done, aov) for aov in seen} == seen  # brought back from the disk
+    gone_on = until_samples(mortal, running, after["samples"] + 50)
     assert gone_on["elapsed_s"] > after["elapsed_s"]
-    assert {status(second, id)["state"] for id in queued} == {"queued"}
-    assert second.stop() == 0  # this time in good order: nothing is lost, and nothing is cancelled
+    assert {status(mortal, id)["state"] for id in queued} == {"queued"}
+    assert mortal.stop() == 0  # this time in good order: nothing is lost, and nothing is cancelled
 
-    third = annas(tmp_path)
-    try:
-        assert status(third, running)["samples"] >= gone_on["samples"]
-        ends = []
-        for id in queued:
-            assert status(third, id, PATIENCE_S)["state"] == "done"
-            ends.append(status(third, running)["state"])
-        assert ends == ["done"] * 3  # the one that was running went first, the others in their order
-        assert pixels(third, running) == undisturbed
-        assert third.http.delete(f"/v1/renders/{running}").status_code == 204  # of an ended one its picture goes
-        assert third.http.get(f"/v1/renders/{running}").status_code == 410
-        assert third.http.get(f"/v1/renders/{running}/image").status_code == 410
-        assert running not in [each["id"] for each in third.http.get("/v1/renders").json()]
-        assert not list((tmp_path / "data" / "renders").glob(f"{running}*"))
-        cancelled = start(third, ENDLESS)
-        until_checkpoint(tmp_path, cancelled)
-        assert third.http.delete(f"/v1/renders/{cancelled}").status_code == 204
-    finally:
-        kill(third)
+    mortal.start()
+    assert mortal.http.get(f"/v1/renders/{old}").status_code == 410  # and it is remembered
+    assert status(mortal, running)["samples"] >= gone_on["samples"]
+    ends = []
+    for id in queued:
+        assert status(mortal, id, PATIENCE_S)["state"] == "done"
+        ends.append(status(mortal, running)["state"])
+    assert ends == ["done"] * 3  # the one that was running went first, the others in their order
+    assert pixels(mortal, running) == undisturbed
+    assert mortal.http.delete(f"/v1/renders/{running}").status_code == 204  # of an ended one its picture goes
+    assert mortal.http.get(f"/v1/renders/{running}").status_code == 410
+    assert mortal.http.get(f"/v1/renders/{running}/image").status_code == 410
+    assert running not in [each["id"] for each in mortal.http.get("/v1/renders").json()]
+    for gone in (old, running):
+        assert not list((mortal.folder / "data" / "renders").glob(f"{gone}*"))
+    cancelled = start(mortal, ENDLESS)
+    until_checkpoint(mortal, cancelled)
+    assert mortal.http.delete(f"/v1/renders/{cancelled}").status_code == 204
+    kill(mortal)
 
-    fourth = annas(tmp_path)
-    try:
-        assert status(fourth, cancelled)["state"] == "cancelled" and status(fourth, cancelled)["samples"] > 0
-        assert pixels(fourth, cancelled)
-        assert fourth.http.get(f"/v1/renders/{running}").status_code == 410
-        assert fourth.http.delete(f"/v1/renders/{cancelled}").status_code == 204
-        assert fourth.http.get(f"/v1/renders/{cancelled}").status_code == 410
-        assert fourth.http.delete(f"/v1/renders/{cancelled}").status_code == 410
-    finally:
-        assert fourth.stop() == 0
+    mortal.start()
+    assert status(mortal, cancelled)["state"] == "cancelled" and status(mortal, cancelled)["samples"] > 0
+    assert pixels(mortal, cancelled)
+    assert mortal.http.get(f"/v1/renders/{running}").status_code == 410
+    assert mortal.http.delete(f"/v1/renders/{cancelled}").status_code == 204
+    assert mortal.http.get(f"/v1/renders/{cancelled}").status_code == 410
+    assert mortal.http.delete(f"/v1/renders/{cancelled}").status_code == 410
 
 
 @pytest.mark.slow
@@ -164,46 +151,23 @@ def test_renders_with_large_documents_share_little_memory_after_a_restart(gpu: R
         kill(server)
 
 
-def test_time_counts_while_the_server_is_down(tmp_path: Path) -> None:
-    short = {"SUNBOX_KEEP_SECONDS": "3600"}
-    first = Server(tmp_path, **short)
-    old, new = start(first), start(first)
-    assert [status(first, id, PATIENCE_S)["state"] for id in (old, new)] == ["done", "done"]
-    assert first.stop() == 0
-    with closing(sqlite3.connect(tmp_path / "data" / FILE)) as file, file:
-        file.execute("UPDATE renders SET ended_at = ended_at - 3700 WHERE id = ?", (old,))
-    second = Server(tmp_path, **short)
-    try:
-        assert second.http.get(f"/v1/renders/{old}").status_code == 410
-        assert pixels(second, new)
-        assert [path.name for path in (tmp_path / "data" / "renders").iterdir()] == [f"{new}.picture"]
-    finally:
-        assert second.stop() == 0
-    third = Server(tmp_path, **short)
-    try:
-        assert third.http.get(f"/v1/renders/{old}").status_code == 410  # and it is remembered
-    finally:
-        assert third.stop() == 0
-
-
-@pytest.fixture(scope="module")
-def keyed(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[AnyServer]:
-    served = Server(tmp_path_factory.mktemp("lasting"), SUNBOX_API_KEY="anna,bert")
-    served.wait()
-    yield served
-    assert served.stop() == 0
-
-
-def submit(server: AnyServer, key: str | None, body: Any, headers: Any = ANNA) -> httpx.Response:
+def submit(server: Server, key: str | None, body: Any, headers: Any = ANNA) -> httpx.Response:
     sent = {**headers, "content-type": "application/json"} | ({} if key is None else {"idempotency-key": key})
     text = body if isinstance(body, str) else json.dumps(body)
     return server.http.post("/v1/renders", content=text, headers=sent)
 
 
-def test_an_idempotency_key_gives_one_render(keyed: AnyServer) -> None:
+def ended(server: Server, answer: httpx.Response, headers: Any) -> None:
+    """Wait until a render that was accepted has ended."""
+    assert answer.status_code == 202, answer.text
+    found = server.http.get(f"/v1/{answer.headers['location']}", params={"wait": PATIENCE_S}, headers=headers)
+    assert found.json()["state"] == "done"
+
+
+def test_an_idempotency_key_gives_one_render(strict: Server) -> None:
     body = {"scene": SCENE, "settings": SMALL, "priority": 1}
     answers: list[httpx.Response] = []
-    threads = [threading.Thread(target=lambda: answers.append(submit(keyed, "once", body))) for _ in range(4)]
+    threads = [threading.Thread(target=lambda: answers.append(submit(strict, "once", body))) for _ in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -213,32 +177,32 @@ def test_an_idempotency_key_gives_one_render(keyed: AnyServer) -> None:
     assert {answer.headers["location"] for answer in answers} == {f"renders/{id}"}
     same = {**SCENE, "camera": {"target": [0, 0.0, 0], "position": [0, 0, 4.0]}}
     text = json.dumps({"priority": 1, "settings": SMALL, "scene": same}, indent=2)
-    assert submit(keyed, "once", text).json()["id"] == id
-    assert submit(keyed, "once", {**body, "priority": 2}).status_code == 409
-    assert submit(keyed, "once", body, BERT).json()["id"] != id
-    assert submit(keyed, None, body).json()["id"] != id
+    assert submit(strict, "once", text).json()["id"] == id
+    assert submit(strict, "once", {**body, "priority": 2}).status_code == 409
+    others = [submit(strict, "once", body, BERT), submit(strict, None, body)]
+    for answer, headers in zip(others, (BERT, ANNA), strict=True):
+        assert answer.json()["id"] != id
+        ended(strict, answer, headers)
 
 
-def test_only_an_accepted_request_takes_a_key(keyed: AnyServer) -> None:
+def test_only_an_accepted_request_takes_a_key(strict: Server) -> None:
     body = {"scene": SCENE, "settings": SMALL}
-    assert submit(keyed, "later", {**body, "settings": {"width": 0}}).status_code == 422
-    assert submit(keyed, "later", body).status_code == 202
+    assert submit(strict, "later", {**body, "settings": {"width": 0}}).status_code == 422
+    ended(strict, submit(strict, "later", body), ANNA)
     for wrong in ("", "x" * 201):
-        assert submit(keyed, wrong, body).status_code == 422
-    assert submit(keyed, "x" * 200, body).status_code == 202
+        assert submit(strict, wrong, body).status_code == 422
+    ended(strict, submit(strict, "x" * 200, body), ANNA)
 
 
-def test_a_full_owner_is_refused_unread_but_for_a_repetition(tmp_path: Path) -> None:
-    server = Server(tmp_path, SUNBOX_MAX_JOBS="1")
-    try:
-        body = {"scene": SCENE, "settings": ENDLESS}
-        id = submit(server, "first", body, {}).json()["id"]
-        assert submit(server, "second", "no JSON", {}).status_code == 429
-        assert submit(server, None, "no JSON", {}).status_code == 429
-        assert submit(server, "first", "no JSON", {}).status_code == 400
-        assert submit(server, "first", body, {}).json()["id"] == id
-    finally:
-        kill(server)
+def test_a_full_owner_is_refused_unread_but_for_a_repetition(strict: Server) -> None:
+    body = {"scene": SCENE, "settings": ENDLESS}
+    answers = [submit(strict, name, body) for name in ("first", "second")]
+    assert submit(strict, "third", "no JSON").status_code == 429
+    assert submit(strict, None, "no JSON").status_code == 429
+    assert submit(strict, "first", "no JSON").status_code == 400
+    assert submit(strict, "first", body).json()["id"] == answers[0].json()["id"]
+    for answer in answers:
+        strict.http.delete(f"/v1/{answer.headers['location']}", headers=ANNA).raise_for_status()
 
 
 @pytest.mark.parametrize(
@@ -252,32 +216,35 @@ def test_a_full_owner_is_refused_unread_but_for_a_repetition(tmp_path: Path) -> 
         ({"lable": "x"}, "/lable"),
     ],
 )
-def test_labels_and_priorities_are_checked(keyed: AnyServer, wrong: Any, pointer: str) -> None:
-    answer = submit(keyed, None, {"scene": SCENE, "settings": SMALL, **wrong})
+def test_labels_and_priorities_are_checked(strict: Server, wrong: Any, pointer: str) -> None:
+    answer = submit(strict, None, {"scene": SCENE, "settings": SMALL, **wrong})
     assert answer.status_code == 422 and [each["pointer"] for each in answer.json()["errors"]] == [pointer]
 
 
-def test_lists_have_pages(keyed: AnyServer) -> None:
-    ids = [start(keyed, headers=BERT, label="page") for _ in range(5)]
-    start(keyed, headers=BERT, label="pages")
+def test_lists_have_pages(strict: Server) -> None:
+    def labelled(label: str) -> str:
+        answer = submit(strict, None, {"scene": SCENE, "settings": SMALL, "label": label}, BERT)
+        ended(strict, answer, BERT)
+        return str(answer.json()["id"])
+
+    ids = [labelled("page") for _ in range(5)]
+    labelled("pages")
     found, address = [], "/v1/renders?label=page&limit=2"
     while address:
-        answer = keyed.http.get(address, headers=BERT)
+        answer = strict.http.get(address, headers=BERT)
         assert len(answer.json()) <= 2 and all(each["label"] == "page" for each in answer.json())
         found += [each["id"] for each in answer.json()]
         address = "/v1/" + answer.links["next"]["url"] if "next" in answer.links else ""
     assert found == ids[::-1]
-    for id in ids:
-        keyed.http.get(f"/v1/renders/{id}?wait={PATIENCE_S}", headers=BERT)
-    assert len(keyed.http.get("/v1/renders?state=done&label=page", headers=BERT).json()) == 5
-    assert keyed.http.get("/v1/renders?label=page", headers=ANNA).json() == []
+    assert len(strict.http.get("/v1/renders?state=done&label=page", headers=BERT).json()) == 5
+    assert strict.http.get("/v1/renders?label=page", headers=ANNA).json() == []
     for wrong in ("state=ended", "limit=0", "limit=201", "limit=x", f"after={'x' * 22}"):
-        assert keyed.http.get(f"/v1/renders?{wrong}", headers=BERT).status_code == 422
+        assert strict.http.get(f"/v1/renders?{wrong}", headers=BERT).status_code == 422
 
 
-def events(server: AnyServer, id: str) -> list[tuple[str, dict[str, Any]]]:
+def events(server: Server, id: str) -> list[tuple[str, dict[str, Any]]]:
     found, name = [], ""
-    with server.http.stream("GET", f"/v1/renders/{id}/events", headers=ANNA) as answer:
+    with server.http.stream("GET", f"/v1/renders/{id}/events") as answer:
         assert answer.headers["content-type"].startswith("text/event-stream")
         for line in answer.iter_lines():
             field, _, value = line.partition(": ")
@@ -288,23 +255,23 @@ def events(server: AnyServer, id: str) -> list[tuple[str, dict[str, Any]]]:
     return found
 
 
-def test_events_tell_how_far_a_render_is(keyed: AnyServer) -> None:
-    id = start(keyed, {**SMALL, "max_samples": 1 << 24, "time_limit": 1.0}, headers=ANNA)
-    told = events(keyed, id)
+def test_events_tell_how_far_a_render_is(server: Server) -> None:
+    id = start(server, {**SMALL, "max_samples": 1 << 24, "time_limit": 1.0})
+    told = events(server, id)
     assert [name for name, _ in told] == ["progress"] * (len(told) - 1) + ["done"]
     samples = [each["samples"] for _, each in told]
     assert len(told) >= 3 and samples == sorted(samples) and samples[-1] > samples[0]
     assert told[-1][1]["state"] == "done" and told[-1][1]["id"] == id
-    assert [name for name, _ in events(keyed, id)] == ["done"]
-    endless = start(keyed, ENDLESS, headers=ANNA)
-    threading.Timer(0.5, lambda: keyed.http.delete(f"/v1/renders/{endless}", headers=ANNA)).start()
-    assert events(keyed, endless)[-1][1]["state"] == "cancelled"
+    assert [name for name, _ in events(server, id)] == ["done"]
+    endless = start(server, ENDLESS)
+    threading.Timer(0.5, lambda: server.http.delete(f"/v1/renders/{endless}")).start()
+    assert events(server, endless)[-1][1]["state"] == "cancelled"
 
 
-def test_the_head_of_events_has_an_end(keyed: AnyServer) -> None:
+def test_the_head_of_events_has_an_end(server: Server) -> None:
     """Another request over the same connection is answered while the render goes on."""
-    id = start(keyed, ENDLESS, headers=ANNA)
-    with httpx.Client(base_url=keyed.url, headers=ANNA, limits=httpx.Limits(max_connections=1)) as one:
+    id = start(server, ENDLESS)
+    with httpx.Client(base_url=server.url, limits=httpx.Limits(max_connections=1)) as one:
         for _ in range(2):
             head = one.head(f"/v1/renders/{id}/events")
             assert head.status_code == 200 and head.headers["content-type"].startswith("text/event-stream")
@@ -312,18 +279,7 @@ def test_the_head_of_events_has_an_end(keyed: AnyServer) -> None:
         assert one.delete(f"/v1/renders/{id}").status_code == 204
 
 
-def test_the_end_of_the_server_ends_events(tmp_path: Path) -> None:
-    served = Server(tmp_path, **OFTEN)
-    id = start(served, ENDLESS)
-    until_samples(served, id, 1)
-    with served.http.stream("GET", f"/v1/renders/{id}/events") as answer:
-        lines = answer.iter_lines()
-        assert next(lines) == "event: progress"
-        served.process.send_signal(signal.SIGTERM)
-        assert "event: done" not in list(lines)
-    assert served.process.wait(PATIENCE_S) == 0
-
-
+@pytest.mark.slow  # what fails where is tried in test_crash_safety.py
 def test_a_full_disk_fails_no_server(tmp_path: Path) -> None:
     """The quota stands for the disk: there is room for the document, but not for the picture."""
     served = Server(tmp_path, SUNBOX_DATA_QUOTA=str(400_000))
