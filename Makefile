@@ -1,6 +1,7 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
-# make long-test         pass the tests that `make test` leaves out: those that take longest, and those of the benchmarks
+# make long-test         pass the tests that `make test` leaves out: those that take longest, and those of the benchmarks;
+#                        and the tests of pictures once more, by each scene's own kernels
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/service/test_hostile.py
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
@@ -12,11 +13,6 @@
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
-# What `make test` runs in three parts. What fails is tried once more, alone: the machine may have been busy.
-MAIN = 'not browser and not calm and not bench and not slow'
-BROWSER = 'browser and not slow'
-TWO = -n 2 --dist loadfile --no-loadscope-reorder
-AGAIN = --last-failed --last-failed-no-failures none
 export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -29,15 +25,11 @@ run: setup
 test:
 	@.ci/setup test
 	.venv/bin/sunbox info
-	.venv/bin/ruff check .
-	.venv/bin/mypy
-	.venv/bin/pytest $(TWO) -m $(MAIN) --durations 20 || .venv/bin/pytest -m $(MAIN) $(AGAIN)
-	.venv/bin/pytest $(TWO) -m $(BROWSER) || .venv/bin/pytest -m $(BROWSER) $(AGAIN)
-	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm $(AGAIN)
+	@.ci/test
 
 long-test:
 	@.ci/setup test
-	.venv/bin/pytest $(TWO) -m 'slow or bench'
+	@.ci/test long
 
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/gpu/test_flags.py tests/shaders/test_furnace.py tests/shaders/test_light.py tests/service/rendering/test_stored_rows.py

@@ -32,19 +32,18 @@ BASE = _flags(
     "SPHERES QUADS BOXES EMISSION LIGHTS MANY_LIGHTS POINT_LIGHTS DIRECTIONAL_LIGHTS SPHERE_LIGHTS QUAD_LIGHTS "
     "ENVIRONMENT APERTURE"
 )
-_LAYERS = _flags("SUBSURFACE SHEEN ANISOTROPIC CLEARCOAT")
-# A family has all of a group or nothing of it.
+_COATS = _flags("SUBSURFACE SHEEN ANISOTROPIC CLEARCOAT")
+# A family has all of a group or nothing of it. Each costs a kernel 1 to 5 s of LLVM, all together many times that.
 GROUPS: dict[str, frozenset[str]] = {
-    "rare": _flags(
-        "VAST_SPHERES DISKS CYLINDERS ELLIPSOIDS CYLINDER_LIGHTS ELLIPSOID_LIGHTS HIDDEN_SHAPES OPACITY "
-        "EMISSION_BOTH SPOT_LIGHTS SUN_DISKS SUN ENVIRONMENT_IMAGE ENVIRONMENT_CUBE ORTHOGRAPHIC PANORAMA"
-    ),
+    "round shapes": _flags("VAST_SPHERES DISKS CYLINDERS ELLIPSOIDS CYLINDER_LIGHTS ELLIPSOID_LIGHTS"),
+    "skies": _flags("SPOT_LIGHTS SUN_DISKS SUN ENVIRONMENT_IMAGE ENVIRONMENT_CUBE ORTHOGRAPHIC PANORAMA"),
+    "layers": _flags("HIDDEN_SHAPES OPACITY EMISSION_BOTH"),
     "meshes": _flags("TRIANGLES TRIANGLE_LIGHTS BVH BVH_TRIANGLES SINGLE_SIDED SMOOTH_NORMALS LIGHT_TREE"),
     "many shapes": _flags("BVH_SPHERES BVH_QUADS BVH_BOXES BVH_ELLIPSOIDS"),
-    "old models": _flags("DISNEY METAL_ROUGH BLINN_PHONG PHONG AMBIENT") | _LAYERS,
-    "principled": _flags("PRINCIPLED PRINCIPLED_LOBES CONDUCTOR") | _LAYERS,
-    "openpbr": _flags("OPENPBR OPENPBR_LOBES DIFFUSE_ROUGHNESS LAYERED_LIGHTS CONDUCTOR") | _LAYERS,
-    # In one kernel with what follows glass takes LLVM twice as long.
+    "old models": _flags("DISNEY METAL_ROUGH BLINN_PHONG PHONG AMBIENT") | _COATS,
+    "principled": _flags("PRINCIPLED PRINCIPLED_LOBES"),
+    "openpbr": _flags("OPENPBR OPENPBR_LOBES DIFFUSE_ROUGHNESS LAYERED_LIGHTS"),
+    "coats": _COATS | _flags("CONDUCTOR"),
     "glass": _flags("TRANSMISSION MIRRORS ATTENUATION"),
     "panes": _flags("THIN_WALLS STRAIGHT"),
     "microfacet": frozenset(name for name in FLAGS if name.startswith("HAS_MICROFACET")),
@@ -57,7 +56,6 @@ GROUPS: dict[str, frozenset[str]] = {
 # A group is chosen by one of these, where others bring the rest of its flags, too.
 _CHOSEN_BY = {
     "old models": _flags("DISNEY METAL_ROUGH BLINN_PHONG PHONG"),
-    "principled": _flags("PRINCIPLED"),
     "openpbr": _flags("OPENPBR"),
 }
 # Records that stand in uniform blocks, from which llvmpipe loads with a third of a storage buffer's code.

@@ -20,6 +20,8 @@ import numpy as np
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
+from tests import kernel_count
+
 COLD_S = 150.0  # caches are empty: every kernel is compiled
 AHEAD = "SUNBOX_AHEAD"  # the setting that tests turn off, but those of what is compiled ahead
 KEYS = ("anna-key", "bert-key")  # of the strict server
@@ -120,6 +122,7 @@ class Server:
             return self.process.wait(PATIENCE_S)
         finally:
             self.process.kill()
+            kernel_count.read_log(self.log)
 
 
 @contextmanager
