@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from gpu import settings as gpu_settings
+from gpu.analysis.kernel_cost import KernelCost
 from gpu.picture import passes
 from service import images, views
 from service.cli import main
@@ -58,28 +59,19 @@ def refused(capsys: pytest.CaptureFixture[str], folder: Path, *arguments: str) -
 
 
 @pytest.mark.parametrize(
-    ("keys", "value", "pointer"),
+    ("change", "pointer"),
     [
-        (("materials", "a", "albedo"), 2, "/materials/a/albedo"),
-        (("materials", "a", "albdo"), 0.5, "/materials/a/albdo"),
-        (("materials", "a", "type"), "lambert", "/materials/a/type"),
-        (("shapes", 0, "material"), "b", "/shapes/0/material"),
-        (("shapes", 0, "radius"), float("nan"), "/shapes/0/radius"),
-        (("environment",), {"type": "image", "asset": "missing.exr"}, "/environment/asset"),
-        (("environment",), {"type": "image", "asset": "../outside.exr"}, "/environment/asset"),
-        (("version",), 2, "/version"),
+        ({"materials": {"a": {"type": "diffuse", "albedo": 2}}}, "/materials/a/albedo"),
+        ({"environment": {"type": "image", "asset": "missing.exr"}}, "/environment/asset"),
+        ({"environment": {"type": "image", "asset": "../outside.exr"}}, "/environment/asset"),
     ],
 )
 def test_scene_mistake_names_its_pointer(
-    keys: tuple[str | int, ...], value: object, pointer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: dict[str, Any], pointer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    document = json.loads(json.dumps(SCENE))
-    place = document
-    for key in keys[:-1]:
-        place = place[key]
-    place[keys[-1]] = value
+    """Which others there are, `tests/service/scene/test_refusals.py` has; files are the command line's own."""
     source = tmp_path / "scene.json"
-    source.write_text(json.dumps(document))
+    source.write_text(json.dumps({**SCENE, **change}))
     assert f"error: {pointer}: " in refused(capsys, tmp_path, str(source), "-o", str(tmp_path / "out.npy"))
 
 
@@ -244,14 +236,15 @@ def test_interrupt_keeps_the_image_so_far(gpu: Any, scene: Path, tmp_path: Path)
     out, stats = tmp_path / "out.npy", tmp_path / "stats.json"
     command = [sys.executable, "-m", "service.cli", "render", str(scene), "-o", str(out), "--stats", str(stats)]
     ours, terminal = os.openpty()
-    render = subprocess.Popen([*command, "--set", "time_limit=60"], stderr=terminal)
+    size = ["--set", "width=64", "--set", "height=48"]
+    render = subprocess.Popen([*command, *size, "--set", "time_limit=60"], stderr=terminal)
     os.close(terminal)
     with open(ours, "rb", buffering=0) as seen:
         shown = seen.read(200)  # the first bar: there are samples
         render.send_signal(signal.SIGINT)
-        assert render.wait(timeout=30) == 130
+        assert render.wait(timeout=60) == 130
     assert b"samples" in shown and b"left" in shown
-    assert np.load(out).shape == (512, 512, 4)
+    assert np.load(out).shape == (48, 64, 4)
     assert json.loads(stats.read_text())["state"] == "cancelled"
 
 
@@ -273,10 +266,12 @@ def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert end.value.code == 0 and capsys.readouterr().out == f"sunbox {version('sunbox')}\n"
 
 
-def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # With a floor: the kernel with everything, 10 s of compiling, is then the one of tests/gpu/test_flags.py.
-    floor = {"type": "quad", "origin": [-4, -1, 4], "u": [8, 0, 0], "v": [0, 0, -8], "material": "a"}
-    scene.write_text(json.dumps({**SCENE, "shapes": [*SCENE["shapes"], floor]}))
+def test_info_names_the_renderer_and_the_scene(
+    gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel with everything takes a minute to compile: what is measured, `tests/gpu/test_flags.py` has."""
+    cost = KernelCost(("spheres",), ("quads",), 100.0, 900.0, 1e-6, 2e-6)
+    monkeypatch.setattr("service.worker.in_process.kernel_cost", lambda renderer, arrays: cost)
     assert main(["info", str(scene), "--measure"]) == 0
     said = capsys.readouterr()
     assert "1 sphere" in said.out and "is saved" in said.out and "compiling" in said.err

@@ -13,7 +13,7 @@ from service.colorimetry import decode_srgb, encode_srgb
 from service.scene import parse_scene
 from tests.usd_files import PNG, QUAD, material, mesh, texture, usda, usdz
 
-pytestmark = pytest.mark.usd
+pytestmark = [pytest.mark.usd, pytest.mark.slow]
 
 UV = """
     texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (

@@ -14,7 +14,7 @@ from service.assets.scene_import import Imported
 from service.scene import parse_scene
 from tests.usd_files import PNG, QUAD, material, mesh, texture, usda, usdc, usdz
 
-pytestmark = pytest.mark.usd
+pytestmark = [pytest.mark.usd, pytest.mark.slow]
 
 
 def imported(store: AssetStore, data: bytes) -> Imported:
@@ -33,14 +33,6 @@ def moved(shape: dict[str, Any], point: tuple[float, float, float]) -> list[floa
     """A point of a shape in the world."""
     matrix = np.array(shape.get("transform", {"matrix": np.eye(4)})["matrix"]).reshape(4, 4)
     return (matrix @ [*point, 1])[:3].round(6).tolist()
-
-
-def test_units_and_axes_become_metres_with_y_up(store: AssetStore) -> None:
-    place = 'double3 xformOp:translate = (100, 200, 300)\nuniform token[] xformOpOrder = ["xformOp:translate"]'
-    found = imported(store, usda(mesh("Sign", place), 'upAxis = "Z"'))  # without metersPerUnit: centimetres
-    sign = shapes(found)["Sign"]
-    assert moved(sign, (0, 0, 0)) == [1, 3, -2] and moved(sign, (0, 0, 100)) == [1, 4, -2]
-    assert sign["smooth"] is False  # polygons without normals are flat
 
 
 def test_the_binary_form_and_a_package_of_layers_are_the_same_scene(store: AssetStore, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from tests.service.rendering.cluster.clusters import (
 )
 from tests.supervisors import LINEAR, Ears, with_supervisor
 
-pytestmark = pytest.mark.ray
+pytestmark = [pytest.mark.ray, pytest.mark.slow]
 
 SECRET = "a key of callers"
 
@@ -88,7 +88,6 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
     run(test)
 
 
-@pytest.mark.slow
 def test_a_gateway_that_hangs_is_replaced(run: Run, cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     async def test(pool: Pool) -> None:
         assert pool.process_id is not None

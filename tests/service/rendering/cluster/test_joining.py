@@ -81,6 +81,7 @@ def closed_port() -> int:
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 @pytest.mark.parametrize("variable", ["SUNBOX_RAY", "RAY_ADDRESS"])
 def test_a_server_does_not_start_without_its_cluster(tmp_path: Path, variable: str) -> None:
     address = f"127.0.0.1:{closed_port()}"
@@ -107,6 +108,7 @@ def test_a_token_in_the_home_folder_is_left_to_its_owner(
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "expected"), [("token", "True"), ("disabled", "False")])
 def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
     program = "from service.renderers.ray.joining import has_token; print(has_token())"
@@ -116,6 +118,7 @@ def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 def test_a_head_that_does_not_answer() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
@@ -171,6 +174,7 @@ async def told(actors: Actors, count: int) -> list[Any]:
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 def test_a_node_with_other_code_is_told_apart() -> None:
     unable, ended = asyncio.run(told(Actors({"host": "far", "version": "0.0.9+abc"}), 2))
     assert isinstance(unable, Unable) and ended == Ended("crashed")
@@ -179,6 +183,7 @@ def test_a_node_with_other_code_is_told_apart() -> None:
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 def test_a_node_without_sunbox() -> None:
     from ray.exceptions import RayActorError
 
@@ -202,6 +207,7 @@ def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 
 @pytest.mark.ray
+@pytest.mark.slow
 def test_it_says_that_there_is_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lane, "PLACING_S", 0.01)
     assert set(asyncio.run(told(Actors(None), 2))) == {Waiting("There is no room.")}

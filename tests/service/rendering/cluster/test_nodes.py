@@ -14,7 +14,7 @@ from service.renderers.pool.pool import Pool
 from service.renderers.ray.cluster import Cluster
 from tests.service.rendering.cluster.clusters import ENDLESS, OPTIONS, Nodes, begun, seats, until
 
-pytestmark = pytest.mark.ray
+pytestmark = [pytest.mark.ray, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,6 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nodes]:
     cluster.close()
 
 
-@pytest.mark.slow
 def test_it_shrinks_to_nothing_and_grows(gpu: Renderer, nodes: Nodes) -> None:
     async def test() -> None:
         cluster = Cluster(nodes.address, 1, False, OPTIONS, nodes_s=0.0)
