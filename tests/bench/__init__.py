@@ -3,6 +3,9 @@
 __main__        the command line
 compare         this checkout beside an earlier revision
 compare_run     one side of `compare`
+faults          which faults of a list the tests find
+fault_list      the list, faults.toml
+fault_plugin    what pytest runs for `faults`, and its report
 first_frames    `frames`: every slider of every built-in scene, changes of scene, thumbnails
 sliders         the sliders of a scene's document
 under_hand      `drag`: how wrong the picture is after each step of a drag

@@ -40,6 +40,12 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--revision", default="HEAD", metavar="REV", help="that revision (default: HEAD)")
     command.add_argument("--runs", type=_count, default=5, metavar="N", help="pairs of processes (default: 5)")
 
+    command = add("faults", _faults, "which faults of a list the tests find, put in one at a time, in an hour")
+    text = "this fault, or those of this room, instead of all; may be given again"
+    command.add_argument("--only", action="append", default=[], metavar="NAME", help=text)
+    text = "also look with all tests of `make test` for what those near do not find: hours"
+    command.add_argument("--whole", action="store_true", help=text)
+
     text = "the first frame after every slider's move and every change of scene, caches empty, in half an hour"
     command = add("frames", _frames, text)
     command.add_argument("--scenes", metavar="NAMES", help="only these built-in scenes, separated by commas")
@@ -95,6 +101,20 @@ def _compare(arguments: argparse.Namespace) -> int:
     print(compare.table(document))
     write_figures(output, document)
     return 0
+
+
+def _faults(arguments: argparse.Namespace) -> int:
+    output = output_path(arguments.output)
+    from tests.bench import faults
+
+    try:
+        chosen = faults.named(arguments.only)
+    except faults.UnknownFault as error:
+        raise BadInput(f"--only {error}") from None
+    rows = faults.measure(chosen, arguments.whole, progress)
+    print(faults.table(rows))
+    write_figures(output, rows)
+    return 0 if faults.suffices(rows) else 1
 
 
 def _frames(arguments: argparse.Namespace) -> int:
