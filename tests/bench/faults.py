@@ -205,12 +205,13 @@ def _ends(process: subprocess.Popen[bytes], report: Path, limit_s: float, at_fai
 
 def parts() -> dict[str, list[str]]:
     """What `make test` runs, as arguments of pytest by their markers."""
-    text = (ROOT / "Makefile").read_text()
-    main, browser, two = (
-        re.findall(rf"^{name} = (.*)$", text, re.MULTILINE)[0] for name in ("MAIN", "BROWSER", "TWO")
-    )
-    marks = {"main": [*shlex.split(two), "-m", *shlex.split(main)]}
-    return marks | {"browser": [*shlex.split(two), "-m", *shlex.split(browser)], "calm": ["-m", "calm"]}
+    text = (ROOT / ".ci" / "test").read_text()
+    two = shlex.split(re.findall(r"^two=\((.*)\)$", text, re.MULTILINE)[0])
+    out = {}
+    for name in ("main", "browser", "calm"):
+        markers, *more = shlex.split(re.findall(rf"^ *part {name} tests (.*)$", text, re.MULTILINE)[0])
+        out[name] = [*(two if "${two[@]}" in more else []), "-m", markers]
+    return out
 
 
 def _copy_checkout(target: Path) -> None:
