@@ -302,9 +302,9 @@ def test_a_kernel_outlives_the_renderer_that_wanted_it(gpu: Renderer, arrays: An
             await asyncio.sleep(0.01)
         supervisor.drop(late)
         os.kill(pid, signal.SIGKILL)
+        assert not record.exists()  # it has hardly begun
         while supervisor.process_id in (pid, None):
             await asyncio.sleep(0.01)
-        assert not record.exists()  # it has hardly begun
         while is_there(helper):  # until it is done
             await asyncio.sleep(0.02)
         assert record.exists()
