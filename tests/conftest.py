@@ -63,8 +63,6 @@ MORTAL = {
     "SUNBOX_HANG_S": "2",
     "SUNBOX_MAX_RUNNING": "1",
 }
-# Files whose tests wait for kernels that are compiled before anybody waits for them.
-COMPILED_AHEAD = ("gpu/test_foreseen.py", "gpu/test_fallback.py")
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -161,13 +159,6 @@ def gpu() -> Iterator[FamilyRenderer]:
         pytest.skip(str(error))
     yield renderer
     renderer.close()
-
-
-@pytest.fixture(autouse=True)
-def _ahead(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have kernels compiled ahead in the tests of just that."""
-    if request.path in (TESTS / name for name in COMPILED_AHEAD):
-        monkeypatch.setenv(AHEAD, "some")
 
 
 @pytest.fixture(autouse=True)

@@ -53,6 +53,7 @@ GROUPS: dict[str, frozenset[str]] = {
     "computed textures": _flags("NOISES SOLID_TEXTURES RAMPS"),
     "media": _flags("MEDIA SCATTERING GLOWING_MEDIA PRIORITIES"),
 }
+MOST_GROUPS = 4  # a scene of everything has eight: the kernel of its family would take a minute, its own 10 s
 # A group is chosen by one of these, where others bring the rest of its flags, too.
 _CHOSEN_BY = {
     "old models": _flags("DISNEY METAL_ROUGH BLINN_PHONG PHONG"),
@@ -63,20 +64,19 @@ _ROOM = {"SPHERE_COUNT": 64, "QUAD_COUNT": 64, "BOX_COUNT": 64, "ELLIPSOID_COUNT
 _LIGHTS, _MATERIALS = 64, 16
 
 
-def family(raised: frozenset[str]) -> frozenset[str]:
-    """The flags of the family of scenes that raise these."""
-    out = raised | BASE
-    for name, group in GROUPS.items():
-        if not raised.isdisjoint(_CHOSEN_BY.get(name, group)):
-            out |= group
-    return out
+def family(raised: frozenset[str]) -> frozenset[str] | None:
+    """The flags of the family of scenes that raise these; None where they are of so many groups that a kernel of
+    their own is compiled sooner."""
+    groups = [group for name, group in GROUPS.items() if not raised.isdisjoint(_CHOSEN_BY.get(name, group))]
+    return raised | BASE.union(*groups) if len(groups) <= MOST_GROUPS else None
 
 
 class FamilyScene(Scene):
     """A scene whose kernels are those of its family."""
 
     def _flags(self) -> frozenset[str]:
-        return family(super()._flags())
+        raised = super()._flags()
+        return family(raised) or raised
 
     def _upload_details(self) -> None:
         super()._upload_details()
@@ -86,6 +86,8 @@ class FamilyScene(Scene):
         self._details |= {unit: placeholder(self._context, unit) for unit in KINDS.keys() - bound}
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
+        if family(self._raised) is None:
+            return super().defines(settings)
         places = textures_glsl.defines(self.arrays.textures)
         counts = features.loops_from_uniforms() | _ROOM | places
         counts["LIGHT_COUNT"] = _LIGHTS if len(self.arrays.lights) <= _LIGHTS else 0

@@ -37,6 +37,7 @@ def _count(counter: Counter, subject: scenes.Subject, settings: RenderSettings =
     return counter.count(subject.packed(subject.document), settings, 2)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", seldom(["rough", "mesh", "glass", "textured"], ["mesh", "glass"]))
 def test_counts_agree_with_what_is_known(counter: Counter, subjects: dict[str, scenes.Subject], name: str) -> None:
     found = _count(counter, subjects[name])
@@ -51,6 +52,7 @@ def test_counts_agree_with_what_is_known(counter: Counter, subjects: dict[str, s
     assert found.a_path["shadow"]["ray"] <= everything["light"] <= 4 * everything["bounce"]
 
 
+@pytest.mark.bench
 def test_lanes_of_one_path_in_eight(counter: Counter, subjects: dict[str, scenes.Subject]) -> None:
     """Where one column of each vector's eight pixels sees a floor, one lane of the vector is in use."""
     subject = subjects["rough"]
@@ -68,6 +70,7 @@ def test_lanes_of_one_path_in_eight(counter: Counter, subjects: dict[str, scenes
     assert found.used["any"]["bounce"] == pytest.approx(1 / 8)
 
 
+@pytest.mark.bench
 def test_without_bounces_there_are_camera_rays_alone(counter: Counter, subjects: dict[str, scenes.Subject]) -> None:
     found = _count(counter, subjects["mesh"], RenderSettings(16, 16, 0, filter="box"))
     assert found.a_path["any"]["ray"] == 1

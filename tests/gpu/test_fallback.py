@@ -233,4 +233,4 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         assert isinstance(only, Frame) and not only.provisional, "at rest one first look is all it wants"
         assert not supervisor.statistics.restarts
 
-    with_supervisor(test)
+    with_supervisor(test, ahead="some")

@@ -38,6 +38,6 @@ def test_a_family_shows_what_the_scene_s_own_kernel_shows(gpu: FamilyRenderer, n
 def test_a_family_has_what_its_scene_needs_and_whole_groups() -> None:
     raised = frozenset({"HAS_TRANSMISSION", "HAS_PRINCIPLED", "HAS_FILM"})
     found = family(raised)
-    assert found >= raised | BASE | GROUPS["glass"] | GROUPS["principled"]
+    assert found is not None and found >= raised | BASE | GROUPS["glass"] | GROUPS["principled"]
     assert found.isdisjoint(GROUPS["textures"])
     assert set(FLAGS) >= BASE.union(*GROUPS.values())

@@ -46,7 +46,7 @@ def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arra
     async def recorded(key: KernelKey) -> None:
         await until_recorded(gpu, key)
 
-    with_supervisor(test)
+    with_supervisor(test, ahead="some")
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_a_lamp_is_seen_before_its_kernel_is_there(gpu: Renderer, arrays: Any, c
         assert isinstance(first, Frame) and first.provisional
         assert (await ears.next_of(task, Loaded)).generation == 2
 
-    with_supervisor(test)
+    with_supervisor(test, ahead="some")
 
 
 async def until_recorded(gpu: Renderer, key: KernelKey) -> None:

@@ -136,6 +136,7 @@ def test_trees_differ_in_their_treelets_alone() -> None:
     assert len({arrays.nodes.tobytes() for arrays in ways.values()}) == 4
 
 
+@pytest.mark.bench
 def test_one_kernel_for_everything_is_compared(monkeypatch: pytest.MonkeyPatch, gpu: Renderer) -> None:
     class Cost:
         full_compile_ms, sample_s, full_sample_s = 900.0, 2.0, 3.0
@@ -146,6 +147,7 @@ def test_one_kernel_for_everything_is_compared(monkeypatch: pytest.MonkeyPatch, 
     assert "1.50" in table._kernels({"kernels": [row]})[-1]
 
 
+@pytest.mark.bench
 def test_caustics_of_both_ways_are_compared(gpu: Renderer) -> None:
     row = caustics.measure("prism", replace(TINY, seconds=1e-3))
     assert row["scene"] == "prism" and all(row[way]["ms_per_sample"] > 0 for way in caustics.WAYS)

@@ -14,6 +14,7 @@ from service.bench import scale, scale_report
 from service.bench.scale_model import BLOCK, Costs, Network, Work, limits, simulate, speedup, steady_speedup
 from service.cli import main
 from service.worker.division.home import EACH
+from tests.marks import seldom
 
 FREE = Network(1e15)
 COSTS = Costs(sample_s=4e-7, write_s=0.0, merge_s=0.0, meter_pixels=0)
@@ -33,7 +34,7 @@ def test_one_renderer_takes_the_time_of_its_samples_and_merges() -> None:
     assert speedup(costs, FREE, WORK, 1) == 1.0
 
 
-@pytest.mark.parametrize("renderers", [2, 7, 16, 64])
+@pytest.mark.parametrize("renderers", seldom([2, 7, 16, 64], [16, 64]))
 def test_where_nothing_else_costs_all_trace_all_the_time(renderers: int) -> None:
     """But at the very end, when the last leases are out."""
     assert steady_speedup(COSTS, FREE, WORK, renderers) == pytest.approx(renderers)
@@ -70,7 +71,10 @@ def test_a_second_lease_hides_latency_up_to_its_own_length() -> None:
     assert gained(COSTS, far, 4, work) < 1 + 3 * share + 0.2
 
 
-@pytest.mark.parametrize(("renderers", "samples"), [(8, 1024), (64, 1024), (64, 256)])
+MANY = [pytest.param(64, samples, marks=pytest.mark.slow) for samples in (1024, 256)]
+
+
+@pytest.mark.parametrize(("renderers", "samples"), [(8, 1024), *MANY])
 def test_the_home_s_first_block_holds_up_many_renderers(renderers: int, samples: int) -> None:
     """The others trace ahead meanwhile, but of a large picture the memory for results holds two or three blocks."""
     work = Work(1920, 1080, samples)
