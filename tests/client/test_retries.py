@@ -81,6 +81,20 @@ def test_servers_time_to_come_again_is_kept() -> None:
     assert _pause(0, "75") == 75 and _pause(3, "0") == 0
 
 
+def test_server_that_says_when_is_heard(scripted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    client, script, _ = scripted
+    heard = []
+
+    def pause(attempt: int, retry_after: str | None = None) -> float:
+        heard.append((attempt, retry_after))
+        return 0.0
+
+    monkeypatch.setattr("sunbox.transport._pause", pause)
+    script += [json_answer(503, PROBLEM), None, json_answer(200, {})]
+    client.info()
+    assert heard == [(0, "0"), (1, None)], "the second time nothing was said"
+
+
 def test_full_server_gives_its_reason_at_last(scripted: Any) -> None:
     client, script, asked = scripted
     script += [json_answer(503, PROBLEM)] * 3

@@ -35,6 +35,15 @@ def test_what_is_somebodys_is_not(server: Server) -> None:
     assert "content-encoding" not in made.headers
 
 
+def test_what_somebody_saved_is_not(server: Server) -> None:
+    address, scene = "/v1/documents/scenes/long", {**SCENE, "shapes": SCENE["shapes"] * 9}
+    server.http.put(address, json=scene).raise_for_status()
+    answer = server.http.get(address, headers=GZIP)
+    server.http.delete(address).raise_for_status()
+    assert len(answer.content) > 500, "shorter answers are never compressed"
+    assert answer.json() == scene and "content-encoding" not in answer.headers
+
+
 def test_unchanged_files_are_not_sent_again(server: Server) -> None:
     first = server.http.get("/main.js", headers=GZIP)
     again = server.http.get("/main.js", headers={**GZIP, "if-none-match": first.headers["etag"]})

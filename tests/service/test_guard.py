@@ -20,7 +20,7 @@ from service.config import Config, ConfigError, load_config
 from service.http.downloads import disconnected
 from service.http.guard import Guard, _Body
 from service.http.keys import Keys
-from service.problems import Unauthorized
+from service.problems import TooLarge, Unauthorized
 from service.routes.errors import respond
 from tests.asset_files import OBJ
 from tests.calls import is_problem
@@ -296,6 +296,26 @@ def test_who_sends_a_refused_body_hears_why() -> None:
     guard = Guard(taken, config=config, refuse=lambda error: PlainTextResponse(str(error), 413))
     asyncio.run(guard(scope, receive, send))
     assert happened == ["answered", "read", "read", "read", "read", "ended"]
+
+
+def test_the_pieces_of_a_body_are_added_up() -> None:
+    """As they come one by one; a server on the same machine often takes several at once."""
+    coming = [{"type": "http.request", "body": b"x" * 4, "more_body": True}] * 3
+    sizes = []
+
+    async def receive() -> Any:
+        return coming.pop()
+
+    async def send(message: Any) -> None: ...
+
+    async def reading(scope: Any, receive: Any, send: Any) -> None:
+        while True:
+            sizes.append(len((await receive())["body"]))
+
+    scope = {"type": "http", "method": "POST", "path": "/v1/assets", "headers": [(b"host", b"127.0.0.1")]}
+    with pytest.raises(TooLarge, match="larger than 10 bytes"):
+        asyncio.run(Guard(reading, config=Config(max_body=10), refuse=respond)(scope, receive, send))
+    assert sizes == [4, 4]
 
 
 def test_saved_documents_are_their_key_s(http: httpx.Client) -> None:

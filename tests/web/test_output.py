@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from PIL import Image
-from playwright.sync_api import Locator
+from playwright.sync_api import Locator, Route
 
 from service.images import read_metadata
 from tests.serving import Server
@@ -245,3 +245,20 @@ def test_a_table_of_colours_is_dropped_saved_and_removed(editor: Editor) -> None
     editor.drop("#stage", {"Broken.cube": b"LUT_1D_SIZE 2\n1 1\n"})
     editor.wait("a word about it", lambda: "Broken.cube was not taken" in page.inner_text("#messages"))
     assert chip.inner_text() == "Inverted.cube", "the last good one stays"
+
+
+def test_a_button_that_is_pressed_twice_renders_once(editor: Editor) -> None:
+    """Both times before the server has answered."""
+    editor.wait("the end", is_done(order(editor, 1)))
+    before, sent = renders(editor).count(), list[Route]()
+    editor.page.route("**/v1/renders", lambda request: sent.append(request))
+    button = editor.page.get_by_role("button", name="Render 64×48")
+    button.click()
+    editor.wait("the request", lambda: sent)
+    button.evaluate("(button) => button.click()")
+    editor.page.locator("#output").get_by_role("button", name="Render picture").evaluate("(button) => button.click()")
+    editor.rest("what follows", lambda: len(sent))
+    for request in sent:
+        request.continue_()
+    editor.wait("its item", lambda: renders(editor).count() > before and button.is_enabled())
+    assert len(sent) == 1

@@ -221,6 +221,13 @@ def test_stl_binary_and_text(store: AssetStore) -> None:
         assert read.normals is None and np.allclose(triangles(read), soup, atol=1e-7)
 
 
+def test_a_binary_stl_may_call_itself_solid(store: AssetStore) -> None:
+    """Many programs begin the header so, as a text does."""
+    soup = RNG.random((5, 3, 3)).astype(np.float32)
+    read = mesh(store, b"solid by some program".ljust(80) + make.stl(soup)[80:], "m.stl")
+    assert np.array_equal(triangles(read), soup)
+
+
 def test_glb_and_gltf_are_the_same(store: AssetStore) -> None:
     for data in (make.glb(make.gltf()), make.embedded(make.gltf())):
         read = mesh(store, data, "")

@@ -145,6 +145,14 @@ def test_the_last_word_decides(stem: str, material: str, roles: str) -> None:
     assert found.material == material and " ".join(found.channels) == roles
 
 
+@pytest.mark.parametrize("name", ["arm", "orm", "mra", "rma"])
+def test_initials_say_what_is_in_which_channel(name: str) -> None:
+    initials = {"a": "occlusion", "o": "occlusion", "r": "roughness", "m": "metallic"}
+    found = meaning(f"crate_{name}_2k")
+    assert found is not None
+    assert found.channels == {initials[letter]: channel for letter, channel in zip(name, "rgb", strict=True)}
+
+
 @pytest.mark.parametrize("stem", ["IMG_2034", "Bricks001", "D", "photo", "1001"])
 def test_a_name_without_such_a_word_says_nothing(stem: str) -> None:
     assert meaning(stem) is None
