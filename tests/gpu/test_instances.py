@@ -21,6 +21,8 @@ from tests.marks import seldom
 from tests.rays import trace
 from tests.rendering import document
 
+pytestmark = pytest.mark.exact  # a tree within a tree, in kernels of families, takes LLVM a minute
+
 
 @pytest.fixture(autouse=True)
 def worth(monkeypatch: pytest.MonkeyPatch) -> None:
