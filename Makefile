@@ -28,7 +28,7 @@ test:
 	@.ci/test
 
 long-test:
-	@.ci/setup test
+	@.ci/setup long
 	@.ci/test long
 
 extremes: setup

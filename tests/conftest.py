@@ -75,7 +75,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return None
 
 
+@pytest.hookimpl(tryfirst=True)  # before markers choose
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if not {"ray", "notebook"}.isdisjoint(mark.name for mark in item.iter_markers()):
+            item.add_marker(pytest.mark.slow)  # 500 MB are installed for them
     for marker, package in (("ray", "ray"), ("notebook", "jupyterlab"), ("usd", "pxr")):
         if importlib.util.find_spec(package) is None and not os.environ.get("CI"):
             reason = f"{package} is not installed: .venv/bin/pip install -r requirements.{marker}.lock"
