@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 TRIANGLE = b"v -1 0.2 1.2\nv 1 0.2 1.2\nv 0 1.9 1.2\nf 1 2 3\n"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 
 def test_views_along_the_axes(editor: Editor) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tests.web.conftest import Editor
 from tests.web.editing import document, point
+from tests.web.editor import Editor
 
 FLOOR = (0.1, 0.75)
 

@@ -14,8 +14,8 @@ from PIL import Image
 from playwright.sync_api import Locator, Page
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import finish, overlay
+from tests.web.editor import Editor
 from tests.web.modules import call
 
 LABELS = ".variant"

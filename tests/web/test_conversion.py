@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from playwright.sync_api import Page, Request
 
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 from tests.web.modules import call
 
 

@@ -7,8 +7,8 @@ import json
 from playwright.sync_api import WebSocketRoute
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import click, halves
+from tests.web.editor import Editor
 
 
 class Slow:

@@ -12,8 +12,9 @@ from PIL import Image
 from playwright.sync_api import BrowserContext
 
 from tests.serving import Server
-from tests.web.conftest import Editor, MortalServer
+from tests.web.conftest import MortalServer
 from tests.web.editing import overlay
+from tests.web.editor import Editor
 
 STAGE = "#stage"
 

@@ -15,8 +15,8 @@ from websockets.typing import Subprotocol
 from gpu import Renderer
 from tests.marks import seldom
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import camera
+from tests.web.editor import Editor
 
 SERIOUS = {"serious", "critical"}
 

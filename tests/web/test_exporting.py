@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 pytestmark = pytest.mark.browser
 

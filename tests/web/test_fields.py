@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 
 def drag(editor: Editor, label: str, right: float, *, escape: bool = False) -> None:

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Page, WebSocketRoute
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import halves
+from tests.web.editor import Editor
 
 KEPT = """async (name) => {
     const { recall } = await import(new URL("lib/browser-storage.js", location));

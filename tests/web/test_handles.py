@@ -10,8 +10,8 @@ import pytest
 from playwright.sync_api import Page
 
 from service.scene.transform import Transform
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 from tests.web.modules import call
 
 CAMERA: dict[str, Any] = {"position": [0.0, 0.0, 5.0], "target": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "vfov": 40}

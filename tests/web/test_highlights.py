@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import document, point
+from tests.web.editor import Editor
 
 BALL: dict[str, Any] = {
     "version": 1,

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 MOST_STOPS = 60  # of the Tab key, to the next thing of a job
 IS_BEFORE = """(selector) => {

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 Size = tuple[int, int, bool]
 SIZES: list[Size] = [(1440, 900, False), (1024, 768, False), (390, 844, True)]

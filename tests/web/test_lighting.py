@@ -9,7 +9,7 @@ import pytest
 
 from tests import gltf_files
 from tests.gltf_lights import BLENDER_LAMP, start_up
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 SETTINGS = {"width": 48, "height": 48, "max_samples": 64, "max_bounces": 3, "seed": 1}
 

@@ -19,8 +19,8 @@ from PIL import Image
 from playwright.sync_api import Route
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import halves
+from tests.web.editor import Editor
 
 PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
 IS_DONE = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import WebSocket
 
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 HIDE = """(hidden) => {
     Object.defineProperty(document, "hidden", { value: hidden, configurable: true });

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tests.web.conftest import Editor
 from tests.web.editing import TRIANGLE, document
+from tests.web.editor import Editor
 
 
 def test_what_is_new_shares_no_material(editor: Editor) -> None:

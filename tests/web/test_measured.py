@@ -9,8 +9,8 @@ import pytest
 
 from tests import measured_files
 from tests.measured_files import Facets
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 
 @pytest.fixture(scope="module")

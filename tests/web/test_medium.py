@@ -7,8 +7,8 @@ import pytest
 from playwright.sync_api import Page
 
 from service.scene.medium import Medium
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 from tests.web.modules import call
 
 SCENE = {"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 2, "material": "m"}]}

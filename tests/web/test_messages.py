@@ -8,7 +8,7 @@ from typing import Any
 from playwright.sync_api import Route, WebSocketRoute
 
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
 

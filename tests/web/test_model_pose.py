@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.gltf_files import Gltf
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 
 @pytest.fixture(scope="module")

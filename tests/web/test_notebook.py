@@ -16,7 +16,8 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page
 
 from tests.serving import Server
-from tests.web.conftest import PATIENCE_S, free_port
+from tests.web.conftest import free_port
+from tests.web.editor import PATIENCE_S
 
 pytestmark = pytest.mark.notebook
 

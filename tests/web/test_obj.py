@@ -6,7 +6,7 @@ import json
 
 from tests.asset_files import png
 from tests.obj_files import GREY, TEXTURED, zipped
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 TWO = TEXTURED + "usemtl shiny\nv 0 0 1\nf 1/1 2/2 5/3\n"
 MATERIALS = (

@@ -6,8 +6,8 @@ from typing import Any
 
 from playwright.sync_api import Page
 
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 from tests.web.modules import call
 
 BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "a"}

@@ -13,7 +13,7 @@ from playwright.sync_api import Locator, Route
 
 from service.images import read_metadata
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 SIDES = ("Width", "Height")
 

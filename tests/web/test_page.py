@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from tests.web.conftest import Editor
 from tests.web.editing import halves
+from tests.web.editor import Editor
 
 # All that a page keeps, and all that it shows.
 STATE = """async () => {

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.marks import seldom
-from tests.web.conftest import Editor
 from tests.web.editing import camera, click, overlay, point
+from tests.web.editor import Editor
 
 
 def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:

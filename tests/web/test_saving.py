@@ -15,8 +15,9 @@ from PIL import Image
 
 from service.images import read_metadata
 from tests.serving import Server
-from tests.web.conftest import WINDOW, Editor
+from tests.web.conftest import WINDOW
 from tests.web.editing import TRIANGLE, finish, overlay
+from tests.web.editor import Editor
 
 
 def read_exr(path: Path) -> tuple[list[str], np.ndarray]:

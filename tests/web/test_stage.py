@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.web.conftest import Editor
 from tests.web.editing import document, point
+from tests.web.editor import Editor
 
 
 def test_things_stand_on_a_ground(editor: Editor) -> None:

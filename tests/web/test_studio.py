@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 FOCUSED = "(document.activeElement.getAttribute('role') ?? document.activeElement.type)"
 

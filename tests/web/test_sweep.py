@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Page
 
 from tests.serving import Server
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 PICTURES = ".sweep [role=option]"
 VALUES = (

@@ -8,8 +8,8 @@ import pytest
 from tests.asset_files import png
 from tests.mtlx_files import from_graph, graph, mtlx, node, surface, value
 from tests.obj_files import zipped
-from tests.web.conftest import Editor
 from tests.web.editing import document, overlay
+from tests.web.editor import Editor
 
 GREEN = np.full((8, 8, 3), (0, 200, 0), np.uint8)
 GREY = np.full((8, 8, 1), 90, np.uint8)

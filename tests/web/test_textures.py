@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from tests.web.conftest import Editor
 from tests.web.editing import halves
+from tests.web.editor import Editor
 
 BENEATH = "#material-form [data-field=base_color] .beneath"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tests import gltf_files
-from tests.web.conftest import Editor
 from tests.web.editing import document
+from tests.web.editor import Editor
 
 
 def entries(editor: Editor, name: str) -> list[float]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 Swipe = Callable[[str, float, float], None]
 

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.serving import Server
-from tests.web.conftest import Editor
+from tests.web.editor import Editor
 
 # The browser's own account of each answer, compressed and with its headers.
 WATCH = "performance.setResourceTimingBufferSize(2000)"
