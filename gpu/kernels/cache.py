@@ -109,8 +109,8 @@ class KernelCache:
             raise CompileError(f"{entry}: {source.explain(str(error))}") from error
         self.last_compile_ms = (time.perf_counter() - start) * 1e3
         on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
-        names = {"key": sha256(source.text.encode()).hexdigest()[:12], "flags": "+".join(on) or "none"}
-        log.info(f"compiled {entry}", {**names, "ms": round(self.last_compile_ms)})
+        key, flags = sha256(source.text.encode()).hexdigest()[:12], "+".join(on) or "none"
+        log.info(f"compiled {entry}", {"key": key, "flags": flags, "ms": round(self.last_compile_ms)})
         return kernel
 
     def release(self) -> None:
