@@ -13,7 +13,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gpu import Renderer, RenderSettings, layout
+from gpu import Renderer, RenderSettings, layout, renderer
 from gpu.arrays import SceneArrays
 from gpu.device.scene import Scene
 from gpu.device.textures import KINDS, placeholder
@@ -112,6 +112,7 @@ class FamilyRenderer(Renderer):
         if self.is_exact or everything:
             return super().load(arrays, editing, everything, raised)
         self._own()
+        renderer._check(arrays)
         return FamilyScene(self.context, arrays, editing, self._shared, False, raised)
 
     @contextmanager
