@@ -104,7 +104,8 @@ class Prober:
         blocks[0].bind_to_uniform_block(bindings.FILTER_BLOCK)
         blocks[1].bind_to_uniform_block(bindings.UNIFORM_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
-            kernel[name].value = value
+            if name in kernel:  # else nothing depends on it
+                kernel[name].value = value
         if features.needs_tables(raised):
             for unit, texture in self._tables.items():
                 texture.use(unit)

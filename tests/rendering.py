@@ -12,6 +12,7 @@ from gpu.settings import ESTIMATORS
 from service.assets import ImageData
 from service.pack import pack
 from service.scene import parse_scene
+from tests.families import EXACT
 
 
 class Images:
@@ -74,16 +75,17 @@ def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "
     return values
 
 
-def assert_estimators_agree(gpu: Renderer, scene: dict[str, Any]) -> None:
-    """That all estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and
-    in the mean."""
+def assert_estimators_agree(gpu: Renderer, scene: dict[str, Any], max_bounces: int = 3, within: float = 0.01) -> None:
+    """That estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and in the
+    mean. `mis` draws as `bsdf` and `light` do, which `make long-test` tries alone."""
     images, errors = [], []
-    for estimator in ESTIMATORS:
-        made = picture(gpu, scene, 1024, estimator=estimator, max_bounces=3, sampler="independent")
+    for estimator in ESTIMATORS if EXACT else ("mis", "uniform"):
+        made = picture(gpu, scene, 1024, estimator=estimator, max_bounces=max_bounces, sampler="independent")
         images.append(made.read()[..., :3].reshape(8, 4, 8, 4, 3).mean((1, 3)))
         errors.append(made.read("variance").reshape(8, 4, 8, 4, 3).mean((1, 3)) / 16)
         made.release()
+        made.scene.release()
     for image, error in zip(images[1:], errors[1:], strict=True):
         z = (image - images[0]) / np.sqrt(error + errors[0] + 1e-12)
         assert np.sqrt((z**2).mean()) < 1.35
-        assert np.abs((image - images[0]).mean()) < 0.01 * images[0].mean()
+        assert np.abs((image - images[0]).mean()) < within * images[0].mean()

@@ -73,6 +73,13 @@ def _words(flags: frozenset[str]) -> tuple[str, ...]:
     return tuple(sorted(flag.removeprefix("HAS_").lower() for flag in flags))
 
 
+def material_words(arrays: SceneArrays) -> np.ndarray:
+    """(materials, n) uint32: each material, followed by its slots and uses of textures."""
+    records = np.ascontiguousarray(arrays.materials)
+    words = records.view(np.uint32).reshape(len(records), layout.Material.words)
+    return words if arrays.textures is None else np.concatenate([words, arrays.textures.words], axis=1)
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
@@ -119,12 +126,7 @@ class Scene:
         self._take_tables()
 
     def _materials(self) -> np.ndarray:
-        """Bytes of all materials, each followed by its slots and uses of textures."""
-        records = np.ascontiguousarray(self.arrays.materials)
-        words = records.view(np.uint32).reshape(len(records), layout.Material.words)
-        if self.arrays.textures is not None:
-            words = np.concatenate([words, self.arrays.textures.words], axis=1)
-        return words
+        return material_words(self.arrays)
 
     def _upload_details(self) -> None:
         """Make the textures of the images' texels and of the triangles' corners that the scene's kernels read."""

@@ -45,7 +45,7 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     out["ANY_CLAMPED"] = int(flags & texture_records.SLOT_CLAMP > 0)
     out["ANY_MIRRORED"] = int(flags & texture_records.SLOT_MIRROR > 0)
     out["TEXTURE_SLOTS"] = count
-    out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
+    out["TEXTURE_SURFACE_SLOTS"] = out["TEXTURE_SURFACE_LOOP"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(textures)}u"
     out["TEXTURE_OPACITY_IN_ALPHA"] = int(textures is not None and _opacity_is_in_alpha(textures))
     return out | recipes_glsl.defines(textures, BASE + count * SLOT_GROUPS + len(slots) * USE_GROUPS)

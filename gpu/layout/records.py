@@ -347,6 +347,7 @@ class Uniforms(Record):
     looped_boxes: u32
     looped_ellipsoids: u32
     looped_triangles: u32
+    looped_textures: u32  # slots that a surface is made from, for a kernel that was not compiled for their number
     group_stride: u32  # places from one work group to the next; see gpu.picture.schedule.group_stride
     footprint_share: f32  # of a pixel's width: that of the footprint of one camera ray; see gpu.picture.filters
     filter_glossy: f32  # least roughness after a path's first scattering

@@ -216,8 +216,8 @@ vec4 texture_sample(TextureSlot s, SurfacePoint at) { return texture_sample(s, a
 // Samples all slots that a surface is made from.
 void texture_look(SurfacePoint at, Footprint footprint, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     texels[0] = vec4(0.0);
-    for (uint k = 0u; k < uint(TEXTURE_SURFACE_SLOTS); k++) {
-        bool made = ((TEXTURE_MADE_SLOTS >> k) & 1u) != 0u; // known to the compiler, as the loop unrolls
+    for (uint k = 0u; k < uint(TEXTURE_SURFACE_LOOP); k++) {
+        bool made = ((TEXTURE_MADE_SLOTS >> k) & 1u) != 0u; // known to the compiler where the loop unrolls
         texels[k] = texture_sample(texture_slot_pick(at.material, k), at, footprint, made);
     }
 }

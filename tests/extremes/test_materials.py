@@ -67,10 +67,10 @@ def _ask(prober: Prober, row: str, wo: np.ndarray, ask: np.ndarray, sample: int,
     asks = np.zeros((len(ask) + 1, 4), np.float32)
     asks[:-1, :3], asks[-1, :3] = ask, wo
     principled = ROWS[row]["model"][0] == P
-    inputs, defines = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}, {"SAMPLE": sample, "INSIDE": inside}
+    inputs, choices = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}, {"samples": sample, "inside": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
     flags = PRINCIPLED_FLAGS if principled else OLD
-    return prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=0)
+    return prober.run("bsdf.comp", len(ask), inputs, outputs, {}, flags, last_wo=0, **choices)
 
 
 @pytest.mark.parametrize(("row", "inside"), CASES)

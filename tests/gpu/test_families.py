@@ -9,7 +9,7 @@ from gpu import RenderSettings
 from gpu.kernels.flag_table import FLAGS
 from service.pack import pack
 from service.scene import parse_scene
-from tests.families import BASE, GROUPS, FamilyRenderer, family
+from tests.families import FAMILIES, FamilyRenderer, family
 from tests.gpu.flag_scenes import IMAGES, SCENES
 from tests.marks import seldom
 
@@ -35,9 +35,9 @@ def test_a_family_shows_what_the_scene_s_own_kernel_shows(gpu: FamilyRenderer, n
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
 
 
-def test_a_family_has_what_its_scene_needs_and_whole_groups() -> None:
-    raised = frozenset({"HAS_TRANSMISSION", "HAS_PRINCIPLED", "HAS_FILM"})
-    found = family(raised)
-    assert found is not None and found >= raised | BASE | GROUPS["glass"] | GROUPS["principled"]
-    assert found.isdisjoint(GROUPS["textures"])
-    assert set(FLAGS) >= BASE.union(*GROUPS.values())
+def test_a_scene_is_of_the_first_family_that_has_its_flags() -> None:
+    assert family(frozenset({"HAS_QUADS"})) == FAMILIES["matte"]
+    assert family(frozenset({"HAS_QUADS", "HAS_PRINCIPLED"})) == FAMILIES["principled"]
+    film = frozenset({"HAS_FILM", "HAS_PRINCIPLED"})
+    assert family(film) > film and family(film | {"HAS_BVH"}) == film | {"HAS_BVH"}
+    assert set(FLAGS) >= frozenset().union(*FAMILIES.values())

@@ -34,8 +34,8 @@ def _mirrored(prober: Prober, m: np.ndarray, cosines: np.ndarray, inside: int = 
     asks = np.zeros((2 * n, 4), np.float32)
     asks[n:, 0], asks[n:, 2] = np.sqrt(1 - cosines**2), cosines
     inputs = {Slot.SUM: asks, Slot.MATERIALS: m}
-    defines = {"SAMPLE": 1, "INSIDE": inside}
-    f, wi = prober.run("bsdf.comp", n, inputs, (Slot.MOMENTS, Slot.OUTPUT), defines, flags, last_wo=n - 1)
+    choices = {"samples": 1, "inside": inside, "last_wo": n - 1}
+    f, wi = prober.run("bsdf.comp", n, inputs, (Slot.MOMENTS, Slot.OUTPUT), {}, flags, **choices)
     assert (wi[:, 2] > 0).all() and (wi[:, 3] == 1).all()
     return f[:, :3].astype(float)
 

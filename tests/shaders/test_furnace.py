@@ -18,7 +18,7 @@ from tests import film
 from tests.extremes.scenes import LONG
 from tests.marks import BY_ESTIMATOR, seldom
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of, rare
-from tests.rendering import document, picture, render
+from tests.rendering import assert_estimators_agree, document, picture, render
 
 WHITE = {"type": "constant", "radiance": 1}
 SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
@@ -255,13 +255,4 @@ def test_rough_glass_agrees_in_every_estimator(gpu: Renderer) -> None:
         "lamp": {"type": "diffuse", "albedo": 0, "emission": 6},
     }  # fmt: skip
     scene = document([SPHERE, inside, floor, lamp], materials_, environment={"type": "constant", "radiance": 0.4})
-    images, errors = [], []
-    for estimator in ESTIMATORS:
-        made = picture(gpu, scene, 1024, estimator=estimator, max_bounces=5, sampler="independent")
-        images.append(made.read()[..., :3].reshape(8, 4, 8, 4, 3).mean((1, 3)))
-        errors.append(made.read("variance").reshape(8, 4, 8, 4, 3).mean((1, 3)) / 16)
-        made.release()
-    for image, error in zip(images[1:], errors[1:], strict=True):
-        z = (image - images[0]) / np.sqrt(error + errors[0] + 1e-12)
-        assert np.sqrt((z**2).mean()) < 1.4
-        assert np.abs((image - images[0]).mean()) < 0.02 * images[0].mean()
+    assert_estimators_agree(gpu, scene, max_bounces=5, within=0.02)

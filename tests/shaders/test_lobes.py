@@ -42,9 +42,8 @@ def _ask(
     is_openpbr = record["model"][0] == NUMBERS["openpbr"]
     flags = FLAGS if row in ROWS else OPENPBR_FLAGS if is_openpbr else PRINCIPLED_FLAGS
     flags |= rare(record)
-    defines = {"SAMPLE": sample, "INSIDE": inside}
-    outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=wo.size // 3 - 1)
+    choices = {"samples": sample, "inside": inside, "last_wo": wo.size // 3 - 1}
+    f, wi = prober.run("bsdf.comp", len(ask), inputs, (Slot.MOMENTS, Slot.OUTPUT), {}, flags, **choices)
     return f.astype(float), wi.astype(float)
 
 

@@ -91,8 +91,9 @@ def ask(prober: Prober, data: MeasuredData, wo: np.ndarray, asks: np.ndarray, sa
     raised = features.flags(arrays) & {
         name for name in features.everything() if "MEASURED" in name or "ANISO" in name
     }
-    out = prober.run("bsdf.comp", len(asks), inputs, (Slot.MOMENTS, Slot.OUTPUT), {"SAMPLE": sample, "INSIDE": 0},
-                     raised, measured=arrays.measured, last_wo=wo.size // 3 - 1)  # fmt: skip
+    choices = {"samples": sample, "inside": 0, "last_wo": wo.size // 3 - 1}
+    out = prober.run("bsdf.comp", len(asks), inputs, (Slot.MOMENTS, Slot.OUTPUT), {}, raised,
+                     measured=arrays.measured, **choices)  # fmt: skip
     return [each.astype(float) for each in out]
 
 

@@ -18,6 +18,7 @@ from service.pack import pack_materials, pack_microfacets
 from service.scene import parse_scene
 from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from tests import microfacets, stats
+from tests.families import EXACT
 from tests.lobes import Grid
 from tests.probing import Prober, prober_of
 
@@ -37,6 +38,7 @@ SHAPES = [
     *[("gaussian", a, 2.0) for a in (0.01, 0.1, 0.5, 2.0)],
 ]
 PLAIN_FLAGS = {f"HAS_MICROFACET_{kind.upper()}_{term.name}" for kind, term in PLAIN.items()}
+MICROFACET_FLAGS = frozenset(name for name in FLAGS if name.startswith("HAS_MICROFACET"))
 ANGLES = (0.0, 45.0, 75.0, 89.9)
 LOWEST = math.cos(math.radians(89.9))
 
@@ -70,9 +72,9 @@ def ask(prober: Prober, m: Doc, wo: np.ndarray, asks: np.ndarray, sample: int = 
     given[:, :3] = np.concatenate([asks, wo.reshape(-1, 3)])
     inputs = {Slot.SUM: given, Slot.MATERIALS: pack_materials(scene)}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    defines = {"SAMPLE": sample, "INSIDE": 0}
-    out = prober.run("bsdf.comp", len(asks), inputs, outputs, defines, frozenset(raised), microfacets=words,
-                     last_wo=wo.size // 3 - 1)  # fmt: skip
+    choices = {"samples": sample, "inside": 0, "last_wo": wo.size // 3 - 1}
+    flags = frozenset(raised) if EXACT else MICROFACET_FLAGS
+    out = prober.run("bsdf.comp", len(asks), inputs, outputs, {}, flags, microfacets=words, **choices)
     return [each.astype(float) for each in out]
 
 

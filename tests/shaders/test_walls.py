@@ -52,9 +52,9 @@ def _ask(prober: Prober, m: np.ndarray, wo: np.ndarray, ask: np.ndarray, sample:
     asks = np.zeros((2 * len(ask), 4), np.float32)
     asks[: len(ask), :3], asks[len(ask) :, :3] = ask, wo
     inputs = {Slot.SUM: asks, Slot.MATERIALS: m}
-    outputs, defines = (Slot.MOMENTS, Slot.OUTPUT), {"SAMPLE": sample, "INSIDE": 0}
+    outputs, choices = (Slot.MOMENTS, Slot.OUTPUT), {"samples": sample, "inside": 0, "last_wo": len(ask) - 1}
     flags = FLAGS[int(m["model"][0])]
-    found = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=len(ask) - 1)
+    found = prober.run("bsdf.comp", len(ask), inputs, outputs, {}, flags, **choices)
     return [each.astype(float) for each in found]
 
 

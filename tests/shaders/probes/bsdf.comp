@@ -1,6 +1,6 @@
-// Evaluates or samples the BSDF of material 0: asks[i] is wi, or (u_lobe, u, u) with SAMPLE 1; behind `count` of them
-// stand the wo, one each or one for all. With INSIDE, wo is inside the body. Perfectly specular samples have
-// directions[i].w = 1.
+// Evaluates the BSDF of material 0 for wi = asks[i]; or samples it by asks[i] = (u_lobe, u, u), where `samples` is 1.
+// Behind `count` of these stand the wo, one each or one for all; where `inside` is 1, they are inside the body.
+// Perfectly specular samples have directions[i].w = 1.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "math/constants.glsl"
@@ -12,6 +12,8 @@ layout(std430, binding = SLOT_MOMENTS) writeonly buffer answer_buffer { vec4 ans
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer direction_buffer { vec4 directions[]; };
 uniform uint count;
 uniform uint last_wo;
+uniform uint samples;
+uniform uint inside;
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -20,19 +22,19 @@ void main() {
     vec4 ask = asks[i];
     vec3 wo = asks[count + min(i, last_wo)].xyz;
     float specular = 0.0;
-    models_face(wo, INSIDE == 1, s);
-#if SAMPLE
-    LobeSample lobe = bsdf_sample(s, wo, ask.x, ask.yz);
-    vec3 wi = lobe.wi;
+    models_face(wo, inside == 1u, s);
+    vec3 wi = ask.xyz;
+    LobeSample lobe;
+    lobe.is_delta = false;
+    if (samples == 1u) {
+        lobe = bsdf_sample(s, wo, ask.x, ask.yz);
+        wi = lobe.wi;
+    }
     Scatter f = bsdf_eval(s, wo, wi);
     if (lobe.is_delta) {
         f = lobe.scatter;
         specular = 1.0;
     }
-#else
-    vec3 wi = ask.xyz;
-    Scatter f = bsdf_eval(s, wo, wi);
-#endif
     answers[i] = vec4(f.f, f.pdf);
     directions[i] = vec4(wi, specular);
 }
