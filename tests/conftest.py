@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import logging
 import os
+import sys
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -14,6 +17,7 @@ import pytest
 
 from gpu import ContextError, Renderer
 from gpu import context as contexts
+from service.logs import setup
 from service.logs.formatters import Console
 from tests import kernel_count
 from tests.families import FamilyRenderer
@@ -233,6 +237,23 @@ def caplog(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
     """pytest's, whose text has the values of records."""
     caplog.handler.setFormatter(Console())
     return caplog
+
+
+@pytest.fixture
+def untouched_logging() -> Iterator[None]:
+    """Logging as it was before the test."""
+    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in setup.ROOMS]
+    before, levels, hooks = (
+        root.handlers[:],
+        [each.level for each in (root, *rooms)],
+        (sys.excepthook, threading.excepthook),
+    )
+    yield
+    root.handlers[:] = before
+    for each, level in zip((root, *rooms), levels, strict=True):
+        each.setLevel(level)
+    sys.excepthook, threading.excepthook = hooks
+    logging.captureWarnings(False)
 
 
 @pytest.fixture

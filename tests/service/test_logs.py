@@ -6,10 +6,8 @@ import ast
 import json
 import logging
 import socket
-import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -27,23 +25,6 @@ ROOT = Path(__file__).parents[2]
 log = logging.getLogger("service.test")
 
 
-@pytest.fixture
-def untouched() -> Iterator[None]:
-    """Logging as it was before the test."""
-    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in setup.ROOMS]
-    before, levels, hooks = (
-        root.handlers[:],
-        [each.level for each in (root, *rooms)],
-        (sys.excepthook, threading.excepthook),
-    )
-    yield
-    root.handlers[:] = before
-    for each, level in zip((root, *rooms), levels, strict=True):
-        each.setLevel(level)
-    sys.excepthook, threading.excepthook = hooks
-    logging.captureWarnings(False)
-
-
 def fail(secret: str) -> None:
     raise ValueError("what went wrong")
 
@@ -56,7 +37,7 @@ def failing(secret: str = "a-local-secret") -> None:
 
 
 @pytest.mark.parametrize("form", ["console", "json"])
-def test_tracebacks_are_plain_and_rare(form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+def test_tracebacks_are_plain_and_rare(form: str, untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
     setup.configure(form, "info")
     for _ in range(5):
         failing()
@@ -72,7 +53,7 @@ def test_tracebacks_are_plain_and_rare(form: str, untouched: None, capfd: pytest
     assert "Traceback" in capfd.readouterr().err
 
 
-def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_logs_does_not_wait(untouched_logging: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rendered in another thread, in order, with what the request was; all of it before the end."""
     written: list[tuple[str, str]] = []
     let_go = threading.Event()
@@ -120,7 +101,9 @@ def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 @pytest.mark.parametrize("form", ["console", "json"])
-def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+def test_no_secret_is_logged(
+    text: str, form: str, untouched_logging: None, capfd: pytest.CaptureFixture[str]
+) -> None:
     setup.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
     log.info("heard", {"text": text})
     log.info(text)
@@ -128,7 +111,7 @@ def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytes
     assert "SECRET" not in told and told.count("***") == 2
 
 
-def test_libraries_speak_of_what_matters(untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+def test_libraries_speak_of_what_matters(untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
     """uvicorn tells each WebSocket's address at INFO, query included; numba's DEBUG is thousands of lines."""
     setup.configure("json", "debug")
     for name in ("uvicorn.error", "numba.core.ssa", "PIL.PngImagePlugin", "asyncio", "websockets"):

@@ -135,17 +135,12 @@ def test_the_readme_has_the_configuration() -> None:
     assert len(shown) >= 5 and set(shown) <= set(config.table().splitlines())
 
 
-def test_logging_is_set_up_once(capfd: pytest.CaptureFixture[str]) -> None:
-    root = logging.getLogger()
-    before, level = root.handlers[:], root.level
-    try:
-        setup.configure("json", "warning")
-        logging.getLogger("a.b").warning("what happened", {"count": 3})
-        logging.getLogger("a.b").info("not told")
-        told = json.loads(capfd.readouterr().err)
-        assert (told["event"], told["count"], told["logger"]) == ("what happened", 3, "a.b")
-    finally:
-        root.handlers[:], root.level = before, level
+def test_logging_is_set_up_once(untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
+    setup.configure("json", "warning")
+    logging.getLogger("a.b").warning("what happened", {"count": 3})
+    logging.getLogger("a.b").info("not told")
+    told = json.loads(capfd.readouterr().err)
+    assert (told["event"], told["count"], told["logger"]) == ("what happened", 3, "a.b")
 
 
 def test_what_changes_on_the_event_loop_is_read_there(tmp_path: Path) -> None:
