@@ -77,6 +77,7 @@ def test_without_bounces_there_are_camera_rays_alone(counter: Counter, subjects:
     assert found.a_path["shadow"] == found.a_path["extension"] == {}
 
 
+@pytest.mark.bench
 def test_counting_does_not_change_the_picture(gpu: Renderer, subjects: dict[str, scenes.Subject]) -> None:
     arrays = subjects["mesh"].packed(subjects["mesh"].document)
     pictures = []
@@ -95,6 +96,7 @@ def test_a_hook_without_its_line_is_an_error(gpu: Renderer) -> None:
             InstrumentedRenderer([Edit("shapes/traverse.glsl", line, "profile();")], "", 1)
 
 
+@pytest.mark.bench
 def test_loads_are_timed_by_kind_and_lanes(gpu: Renderer) -> None:
     found = load_costs(runs=3, groups=8)
     assert set(found) == {*KINDS, NOTHING}

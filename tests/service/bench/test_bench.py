@@ -39,6 +39,7 @@ def test_given_mesh_takes_the_place_of_the_generated_one(tmp_path: Path) -> None
     assert mesh.vertices.tolist() == [[-1, 0, 0], [1, 0, 0], [-1, 2, 0]]
 
 
+@pytest.mark.bench
 def test_case_is_measured(gpu: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(speed, "SIZE", 32)
     monkeypatch.setattr(timing, "RUN_S", 0.05)
@@ -48,6 +49,7 @@ def test_case_is_measured(gpu: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert row["mpaths_per_s"] > 0 and row["compile_ms"] > 0 and row["spread"] >= 0
 
 
+@pytest.mark.bench
 def test_growth_is_that_of_one_form(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     coarse, fine = (trimesh.Trimesh(m.vertices, m.faces).volume for m in map(growth.ball, (4, 5)))
     assert coarse == pytest.approx(fine, rel=0.01)

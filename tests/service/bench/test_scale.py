@@ -41,11 +41,14 @@ def test_where_nothing_else_costs_all_trace_all_the_time(renderers: int) -> None
     assert 0.93 * renderers < gained(COSTS, FREE, renderers) <= renderers
 
 
+LONG = pytest.mark.bench  # the model has an event for each part of each result
+
+
 @pytest.mark.parametrize(
     ("part", "costs", "network"),
     [
-        ("link", COSTS, Network(bytes_per_s=48 * 20 / (BLOCK * 4e-7))),
-        ("front door", COSTS, Network(1e15, door_byte_s=BLOCK * 4e-7 / 48 / 20)),
+        pytest.param("link", COSTS, Network(bytes_per_s=48 * 20 / (BLOCK * 4e-7)), marks=LONG),
+        pytest.param("front door", COSTS, Network(1e15, door_byte_s=BLOCK * 4e-7 / 48 / 20), marks=LONG),
         ("home", Costs(4e-7, write_s=BLOCK * 4e-7 / 20, merge_s=0.0, meter_pixels=0), FREE),
         ("home", Costs(4e-7, write_s=0.0, merge_s=BLOCK * 4e-7 / 20, meter_pixels=0), FREE),
         ("home", Costs(4e-7, write_s=0.0, merge_s=0.0, meter_pixels=WORK.pixels // 20), FREE),

@@ -23,6 +23,7 @@ def stage(gpu: Renderer) -> Stage:
     return Stage(gpu, quick=True, told=lambda what: None)
 
 
+@pytest.mark.bench
 def test_every_tree_shows_the_same_spheres(gpu: Renderer) -> None:
     """With treelets, too: of 5 000 boxes not all fit into the top."""
     with UnboundedRenderer() as renderer:
@@ -49,6 +50,7 @@ def test_the_vase_is_closed_but_for_nothing(stage: Stage) -> None:
     assert {shape["material"] for shape in scene["shapes"]} == set(scene["materials"])
 
 
+@pytest.mark.bench
 def test_the_cube_shows_the_sky_of_the_picture(stage: Stage) -> None:
     """As an image and as six faces it lights a ball alike."""
     material = samples.MATERIALS["diffuse"]
