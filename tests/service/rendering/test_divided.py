@@ -17,15 +17,18 @@ from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule,
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
+from tests.families import FamilyRenderer
+from tests.serving import PATIENCE_S
 from tests.supervisors import LINEAR, Ears, arrays_of, renderer_options, settings
 
 SIDE, SAMPLES = 96, 500  # the last block ends before its border
 
 
 @pytest.fixture(scope="module")
-def alone(gpu: Renderer) -> dict[str, np.ndarray]:
-    """The AOVs of the picture that one renderer traces at a time."""
-    scene = gpu.load(arrays_of("plain"))
+def alone(gpu: FamilyRenderer) -> dict[str, np.ndarray]:
+    """The AOVs of the picture that one renderer traces at a time, by the kernel that the renderers have."""
+    with gpu.exact():
+        scene = gpu.load(arrays_of("plain"))
     picture = gpu.picture(scene, RenderSettings(**settings(SIDE, seed=4)))
     picture.trace(1e9, SAMPLES)
     read = {aov: picture.read(aov) for aov in ("color", "variance", "depth")}
@@ -35,7 +38,7 @@ def alone(gpu: Renderer) -> dict[str, np.ndarray]:
 
 
 class _Divided:
-    """A pool of three renderers with one render, and what it is told of it."""
+    """A pool of three renderers with one render at a time, and what it is told of it."""
 
     def __init__(self) -> None:
         self.pool = Pool([Seat(Place(str(n)), start=partial(self._start, n)) for n in range(3)])
@@ -47,9 +50,11 @@ class _Divided:
         return Process(Options(device=99) if number == self.broken else renderer_options(checkpoint_s=0.2), *given)
 
     async def begin(self, samples: int = SAMPLES) -> None:
-        self.pool.start()
+        if not self.task:
+            self.pool.start()
         while not all(member.state == "ready" for member in self.pool.members):
             await asyncio.sleep(0.02)
+        self.ears = Ears()
         self.task = self.pool.open(self.ears, "render")
         await self.pool.send_scene(
             Update(self.task, 1, arrays_of("plain"), settings(SIDE, seed=4), StopRule(samples))
@@ -85,14 +90,19 @@ class _Divided:
         return out
 
 
-def _run(act: Callable[[_Divided], Awaitable[None]]) -> dict[str, np.ndarray]:
-    async def test() -> dict[str, np.ndarray]:
-        divided = _Divided()
+def _run(*acts: Callable[[_Divided], Awaitable[None]]) -> list[dict[str, np.ndarray]]:
+    """The picture of a render in which that happens, for one after the other in the same pool."""
+
+    async def test() -> list[dict[str, np.ndarray]]:
+        divided, found = _Divided(), list[dict[str, np.ndarray]]()
         try:
-            async with asyncio.timeout(240):
-                await divided.begin()
-                await act(divided)
-                return await divided.pictures()
+            async with asyncio.timeout(PATIENCE_S * len(acts)):
+                for act in acts:
+                    await divided.begin()
+                    await act(divided)
+                    found.append(await divided.pictures())
+                    divided.pool.drop(divided.task)
+            return found
         finally:
             await divided.pool.close()
 
@@ -141,18 +151,19 @@ async def _kill_all(divided: _Divided) -> None:
 
 
 @pytest.mark.parametrize(
-    "act",
+    "acts",
     [
-        _nothing,
-        _kill_home,
-        *(pytest.param(a, marks=pytest.mark.slow) for a in (_kill_assistant, _lose_home, _kill_all)),
+        (_nothing, _kill_home),
+        *(pytest.param((a,), marks=pytest.mark.slow) for a in (_kill_assistant, _lose_home, _kill_all)),
     ],
+    ids=lambda acts: " and ".join(act.__name__[1:] for act in acts),
 )
 def test_bits_are_those_of_one_renderer(
-    act: Callable[[_Divided], Awaitable[None]], alone: dict[str, np.ndarray], impatient: None
+    acts: tuple[Callable[[_Divided], Awaitable[None]], ...], alone: dict[str, np.ndarray], impatient: None
 ) -> None:
-    for aov, pixels in _run(act).items():
-        np.testing.assert_array_equal(pixels, alone[aov], err_msg=aov)
+    for act, found in zip(acts, _run(*acts), strict=True):
+        for aov, pixels in found.items():
+            np.testing.assert_array_equal(pixels, alone[aov], err_msg=f"{act.__name__} {aov}")
 
 
 @pytest.mark.slow
