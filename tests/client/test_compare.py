@@ -22,9 +22,9 @@ SETTINGS = {"width": 32, "height": 24, "max_samples": 32}
 SIZE = ["--set", "width=32", "--set", "height=24", "--spp", "32"]
 
 
-def rougher(value: float = 0.9) -> Any:
+def paler(value: float = 0.9) -> Any:
     scene = copy.deepcopy(SCENE)
-    scene["materials"]["ball"] = {"type": "diffuse", "albedo": value}
+    scene["materials"]["ball"]["base_color"] = value
     return scene
 
 
@@ -32,7 +32,7 @@ def rougher(value: float = 0.9) -> Any:
 def folder(tmp_path: Path) -> Path:
     """A reference and what is tested: `same` and `other`; `new` and `old` are in one of them only."""
     here = {"reference/same": SCENE, "reference/glass/other": SCENE, "reference/old": SCENE}
-    there = {"tested/same": SCENE, "tested/glass/other": rougher(), "tested/new": SCENE}
+    there = {"tested/same": SCENE, "tested/glass/other": paler(), "tested/new": SCENE}
     for name, scene in {**here, **there}.items():
         path = tmp_path / f"{name}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,7 @@ def test_a_verdict(server: Server, folder: Path) -> None:
     with sunbox.Client(server.url) as client:
         same = client.compare(SCENE, folder / "tested" / "same.json", **SETTINGS)
         assert (same.different, same.p_value, same.psnr, same.regions, same.map) == (False, 1.0, None, [], None)
-        other = client.compare({"scene": SCENE, "settings": SETTINGS}, rougher(), 0.99, map="heat", **SETTINGS)
+        other = client.compare({"scene": SCENE, "settings": SETTINGS}, paler(), 0.99, map="heat", **SETTINGS)
         assert other.different and other.p_value < 0.01 and other.samples["a"] == other.samples["b"] <= 32
         region = other.regions[0]
         assert region.x + region.width <= 32 and region.y + region.height <= 24 and region.p_value < 0.01
@@ -62,7 +62,7 @@ def test_a_verdict(server: Server, folder: Path) -> None:
 def test_a_verdict_awaited(server: Server) -> None:
     async def found() -> sunbox.Verdict:
         async with sunbox.AsyncClient(server.url) as client:
-            return await client.compare(SCENE, rougher(), **SETTINGS)
+            return await client.compare(SCENE, paler(), **SETTINGS)
 
     assert asyncio.run(found()).different
 
@@ -159,7 +159,7 @@ def test_a_folder_of_pictures_is_a_reference(
     ask = ["test", str(tested), "--against", str(reference), "--server", server.url, "-o", str(folder / "sheet.png")]
     assert main(ask) == 0
     assert not (folder / "sheet.png").exists()
-    (tested / "same.json").write_text(json.dumps(rougher()))
+    (tested / "same.json").write_text(json.dumps(paler()))
     assert main(ask) == 1
     assert (folder / "sheet.png").exists()
     (tested / "same.json").write_text("{}")

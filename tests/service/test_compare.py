@@ -17,13 +17,14 @@ from service.verdict.figures import displayed
 from tests.calls import is_problem, metrics, pixels, start, status
 from tests.serving import Server, wait_until
 
+# Of the features of `serving.SCENE`, so that both have one kernel.
 BALL: dict[str, Any] = {
     "version": 1,
     "camera": {"position": [0, 0, 3.2], "target": [0, 0, 0]},
     "environment": {"type": "constant", "radiance": 0.3},
     "lights": [{"type": "point", "position": [3, 4, 4], "intensity": 80}],
     "materials": {
-        "ball": {"type": "principled", "base_color": [0.8, 0.3, 0.2], "roughness": 0.3},
+        "ball": {"type": "disney", "base_color": [0.8, 0.3, 0.2], "roughness": 0.3},
         "floor": {"type": "diffuse", "albedo": 0.6},
     },
     "shapes": [
@@ -247,12 +248,12 @@ def test_denoising_and_adaptive_samples_are_left_out_of_documents(http: httpx.Cl
 
 def test_a_time_limit_ends_it(http: httpx.Client) -> None:
     """Of no samples' number: a comparison of equal noise would go on to 2^24 samples."""
-    a, b = (document(samples=2**24, time_limit=0.2, sampler=each) for each in ("sobol", "independent"))
+    a, b = (document(samples=2**24, time_limit=0.2, roulette_depth=each) for each in (1, 3))
     assert compare(http, a, b)["samples"]["a"] < 2**20
 
 
 def test_going_away_ends_the_work(server: Server) -> None:
-    sides = [document(samples=2**24, sampler=each) for each in ("sobol", "independent")]
+    sides = [document(samples=2**24, roulette_depth=each) for each in (1, 3)]
 
     def under_way() -> float:
         found = metrics(server)

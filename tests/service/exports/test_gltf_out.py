@@ -86,7 +86,8 @@ def assert_same_arrays(one: dict[str, Any], other: dict[str, Any], store: AssetS
     a, b = (pack(parse_scene(each), store).arrays for each in (one, other))
     for name, value in vars(a).items():
         if isinstance(value, np.ndarray):
-            assert value.tobytes() == getattr(b, name).tobytes(), name
+            same = value.tobytes() == getattr(b, name).tobytes()
+            assert same or np.array_equal(value, getattr(b, name)), name  # a zero may change its sign
     lens = [name for name in a.camera.dtype.names if name != "focus_distance"]  # which a pinhole does not use
     assert a.camera[lens] == b.camera[lens]
     if a.textures is not None:
@@ -139,17 +140,17 @@ def test_a_scene_of_meshes_comes_back_to_the_bit(store: AssetStore, gpu: Rendere
     assert one.mean() > 0.1 and np.array_equal(one, other)
 
 
-def test_dispersion_comes_back_to_the_bit(store: AssetStore, gpu: Renderer) -> None:
+def test_dispersion_comes_back_to_the_bit(store: AssetStore) -> None:
     flint = {"type": "principled", "base_color": 1, "transmission": 1, "roughness": 0.25, "ior": 1.75, "abbe": 32}
     before = scene({**TENT, "material": "flint"}, materials={"flint": flint}, lights=LIGHTS)
     made = exported(before, store)
     assert lost(made) == {}
     after = again(made, store)
     assert after["materials"]["flint"]["abbe"] == 32
-    assert np.array_equal(pixels(gpu, before, store), pixels(gpu, after, store))
+    assert_same_arrays(before, after, store)
 
 
-def test_thin_walls_come_back_to_the_bit(store: AssetStore, gpu: Renderer) -> None:
+def test_thin_walls_come_back_to_the_bit(store: AssetStore) -> None:
     pane = {
         "type": "principled",
         "base_color": [1, 0.5, 0.25],
@@ -166,8 +167,7 @@ def test_thin_walls_come_back_to_the_bit(store: AssetStore, gpu: Renderer) -> No
     after = again(made, store)
     assert after["materials"]["leaf"]["diffuse_transmission_color"] == [0.5, 1, 0.25]
     assert after["materials"]["pane"]["thin_walled"] is True
-    one, other = (pixels(gpu, each, store) for each in (before, after))
-    assert one.mean() > 0.1 and np.array_equal(one, other)
+    assert_same_arrays(before, after, store)
 
 
 def pixels(gpu: Renderer, document: dict[str, Any], store: AssetStore) -> np.ndarray:
