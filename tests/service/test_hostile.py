@@ -26,12 +26,13 @@ from schemathesis.specs.openapi import checks
 from service import presets
 from service.routes.examples import SCENE
 from tests import asset_files as make
+from tests import serving
 from tests.hostile import mutated_bytes, mutated_document, mutated_json
 from tests.serving import KEYS, Client, Server
 
 DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 80))
 FILES = int(os.environ.get("HOSTILE_FILES", 30))
-EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 4))
+EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 2))
 SEED = int(os.environ.get("HOSTILE_SEED", 1))
 CHECKS = [
     schemathesis.checks.not_a_server_error,
@@ -221,13 +222,18 @@ def _used(server: Server, asset: dict[str, Any]) -> int:
     return answer.status_code
 
 
-def test_mutated_messages(strict: Server) -> None:
+@pytest.mark.parametrize(
+    "document",
+    [serving.SCENE, pytest.param(EVERYTHING, marks=pytest.mark.slow)],  # of everything each other scene has a kernel
+    ids=["a ball", "everything"],
+)
+def test_mutated_messages(strict: Server, document: dict[str, Any]) -> None:
     """The stream answers each with errors or frames, and goes on."""
     rng = random.Random(SEED)
     with Client(strict.url, key=KEYS[0]) as stream:
-        stream.start(generation=1, scene=EVERYTHING, settings=SMALL, view={"format": "png", "max_fps": 30})
+        stream.start(generation=1, scene=document, settings=SMALL, view={"format": "png", "max_fps": 30})
         for i in range(max(50, DOCUMENTS // 10)):
-            patch = mutated_document({"materials": EVERYTHING["materials"], "shapes": EVERYTHING["shapes"]}, rng)
+            patch = mutated_document({"materials": document["materials"], "shapes": document["shapes"]}, rng)
             message = {"type": "update", "generation": i + 2, "scene": patch, "settings": {"seed": 1}}
             data = mutated_json(rng.choice((message, {"type": "view", "exposure": 1, "aov": "depth"})), rng)
             stream.socket.send(data.decode("utf-8", "replace"))

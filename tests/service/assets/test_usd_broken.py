@@ -51,6 +51,7 @@ def test_nothing_outside_of_the_upload_is_opened(store: AssetStore, tmp_path: Pa
 
 
 @pytest.mark.usd
+@pytest.mark.slow
 def test_packages_that_lead_out_or_blow_up_are_refused(store: AssetStore) -> None:
     from service.assets.usd.importer import read_scene
 
@@ -74,6 +75,7 @@ def test_packages_that_lead_out_or_blow_up_are_refused(store: AssetStore) -> Non
 
 
 @pytest.mark.usd
+@pytest.mark.slow
 def test_instances_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight levels of ten instances each, an instancer within itself, and too many places."""
     from service.assets.usd import importer, walk
@@ -95,6 +97,7 @@ def test_instances_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usd
+@pytest.mark.slow
 def test_broken_binary_layers_end_a_child_at_most(store: AssetStore, tmp_path: Path) -> None:
     whole = usdc(usda(f'def Xform "Car"\n{{\n{mesh("Door")}\n}}\n' + material("Look", "")), tmp_path)
     dice, read = random.Random(1), 0

@@ -26,7 +26,7 @@ from service.scene import parse_settings
 from service.storage.database import FILE
 from tests.serving import ENDLESS, KEYS, PATIENCE_S, SCENE, SMALL, Server, kill, wait_until
 
-LONG = {"width": 96, "height": 96, "max_samples": 800, "seed": 3}
+LONG = {"width": 96, "height": 96, "max_samples": 500, "seed": 3}
 ANNA, BERT = ({"authorization": f"Bearer {key}"} for key in KEYS)
 
 
