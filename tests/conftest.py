@@ -30,14 +30,16 @@ TESTS = Path(__file__).parent
 # The files that take longest, in this order: begun last, one of them would leave a core without work.
 LONG_FILES = (
     "web/test_editor.py", "web/test_saving.py", "web/test_everyone.py", "web/test_lobe.py", "web/test_picture.py",
-    "web/test_variants.py", "bench/test_first_frames.py", "bench/test_hemisphere.py", "shaders/test_furnace.py",
-    "gpu/test_fallback.py", "service/test_one_client.py",
-    "service/rendering/test_durable.py", "service/bench/test_scale.py", "service/test_hostile.py",
-    "bench/test_soak.py", "service/bench/test_bench.py", "bench/test_profile.py",
-    "service/rendering/cluster/test_cluster.py", "service/rendering/test_survival.py", "shaders/test_light.py",
-    "service/rendering/cluster/test_nodes.py", "gpu/test_precompile.py", "service/rendering/test_divided.py",
-    "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "service/test_rest.py",
-    "shaders/test_lobes.py", "service/bench/test_device.py", "service/rendering/test_checkpoints.py",
+    "web/test_variants.py", "shaders/test_furnace.py", "gpu/test_fallback.py",
+    "service/rendering/test_survival.py", "service/rendering/test_durable.py", "shaders/test_light.py",
+    "gpu/test_precompile.py", "service/pack/test_tangents.py", "service/bench/test_bench.py", "client/test_agents.py",
+    "service/test_hostile.py", "service/rendering/test_divided.py", "client/test_batch.py", "service/test_rest.py",
+    "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "shaders/test_lobes.py",
+    "service/test_one_client.py", "service/exports/test_gltf_out.py", "service/rendering/test_checkpoints.py",
+    # of `make long-test`
+    "bench/test_first_frames.py", "bench/test_hemisphere.py", "service/bench/test_scale.py", "bench/test_soak.py",
+    "bench/test_profile.py", "service/rendering/cluster/test_cluster.py", "service/rendering/cluster/test_nodes.py",
+    "service/bench/test_device.py",
 )  # fmt: skip
 
 STRICT = {

@@ -132,7 +132,7 @@ def test_a_large_picture_is_scaled_down(agent: Agent) -> None:
 
 
 def test_a_picture_is_small_unless_more_is_said(agent: Agent) -> None:
-    found = result(agent.done("render", scene="sphere-on-floor", settings={"max_samples": 1}))
+    found = result(agent.done("render", scene="cornell-empty", settings={"max_samples": 1}))
     assert (found["width"], found["height"], found["samples"]) == (512, 384, 1)
 
 

@@ -47,7 +47,7 @@ def test_an_edit_shows_what_a_new_stream_shows(server: Server, edit: str) -> Non
     np.testing.assert_allclose(found.array(), shown(server, after), rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.slow  # the kernel of both models' code; that flags grow with an edit, tests/gpu/test_flags.py has
+@pytest.mark.slow  # the kernel of both models' code; that flags grow with an edit, test_untouched_parts.py has
 def test_an_edit_brings_the_first_microfacet(server: Server) -> None:
     with client(server) as stream:
         stream.start(scene=SCENE, settings=SMALL, view=RAW)
