@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
-from tests.serving import ENDLESS, SMALL, Client, Server
+from tests.serving import ENDLESS, Client, Server
 from tests.serving import client as opened
 from tests.streams import pictures, rises
 
@@ -54,8 +54,6 @@ def test_done_says_that_caustics_were_traced_from_the_lights(client: Client) -> 
     }
     client.start(scene=scene)
     assert client.finished()[0]["caustics"] == "light"
-    client.start(2, scene=scene, settings=SMALL | {"caustics": "paths"})
-    assert client.finished()[0]["caustics"] == "paths"
 
 
 def test_frames_rise(client: Client) -> None:

@@ -162,16 +162,15 @@ def test_edits_give_the_picture_of_a_new_start(client: Client) -> None:
     assert np.array_equal(edited.array(), fresh.array())
 
 
-def test_a_heavy_scene_is_first_seen_small(client: Client, server: Server) -> None:
-    scene = server.http.get("/v1/presets/scenes/sphere-field").json()
-    client.start(scene=scene, settings={"width": 384, "height": 256, "max_samples": 3})
+def test_a_heavy_picture_is_first_seen_small(client: Client) -> None:
+    client.start(settings={"width": 1200, "height": 800, "max_samples": 3})
     frames: list[Picture] = []
     while not frames or frames[-1].scale < 1:
         frames.append(client.frame())
     client.say("update", generation=2, scene={"camera": {"vfov": 50}})
     frames.append(client.frame(generation=2))
     assert frames[0].scale < 1 and frames[-1].scale < 1
-    assert all((f.width, f.height) == (round(384 * f.scale), round(256 * f.scale)) for f in frames)
+    assert all((f.width, f.height) == (round(1200 * f.scale), round(800 * f.scale)) for f in frames)
     while frames[-1].scale < 1:
         frames.append(client.frame(generation=2))
     assert rises(frames)
