@@ -90,6 +90,7 @@ def _raises() -> None:
     raise KeyError("a scene")
 
 
+@pytest.mark.bench
 def test_a_process_is_lost_alone(tmp_path: Path) -> None:
     assert isolated.Isolated(tmp_path, os.getenv, "MESA_SHADER_CACHE_DIR").result(30) == str(tmp_path)
     for function, arguments, why in (
@@ -129,6 +130,7 @@ def test_a_dispatch_is_as_long_as_it_is_asked_to_be(gpu: Renderer) -> None:
     scene.release()
 
 
+@pytest.mark.bench
 def test_trees_differ_in_their_treelets_alone() -> None:
     ways = trees.ways("generated-mesh")
     for way, arrays in ways.items():

@@ -50,8 +50,8 @@ LONG = pytest.mark.bench  # the model has an event for each part of each result
         pytest.param("link", COSTS, Network(bytes_per_s=48 * 20 / (BLOCK * 4e-7)), marks=LONG),
         pytest.param("front door", COSTS, Network(1e15, door_byte_s=BLOCK * 4e-7 / 48 / 20), marks=LONG),
         ("home", Costs(4e-7, write_s=BLOCK * 4e-7 / 20, merge_s=0.0, meter_pixels=0), FREE),
-        ("home", Costs(4e-7, write_s=0.0, merge_s=BLOCK * 4e-7 / 20, meter_pixels=0), FREE),
-        ("home", Costs(4e-7, write_s=0.0, merge_s=0.0, meter_pixels=WORK.pixels // 20), FREE),
+        pytest.param("home", Costs(4e-7, write_s=0.0, merge_s=BLOCK * 4e-7 / 20, meter_pixels=0), FREE, marks=LONG),
+        pytest.param("home", Costs(4e-7, write_s=0.0, merge_s=0.0, meter_pixels=WORK.pixels // 20), FREE, marks=LONG),
     ],
     ids=["link", "front door", "writing", "merging", "meter"],
 )
