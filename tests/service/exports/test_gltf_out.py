@@ -86,8 +86,7 @@ def assert_same_arrays(one: dict[str, Any], other: dict[str, Any], store: AssetS
     a, b = (pack(parse_scene(each), store).arrays for each in (one, other))
     for name, value in vars(a).items():
         if isinstance(value, np.ndarray):
-            same = value.tobytes() == getattr(b, name).tobytes()
-            assert same or np.array_equal(value, getattr(b, name)), name  # a zero may change its sign
+            assert value.tobytes() == getattr(b, name).tobytes(), name
     lens = [name for name in a.camera.dtype.names if name != "focus_distance"]  # which a pinhole does not use
     assert a.camera[lens] == b.camera[lens]
     if a.textures is not None:
@@ -142,7 +141,7 @@ def test_a_scene_of_meshes_comes_back_to_the_bit(store: AssetStore, gpu: Rendere
 
 def test_dispersion_comes_back_to_the_bit(store: AssetStore) -> None:
     flint = {"type": "principled", "base_color": 1, "transmission": 1, "roughness": 0.25, "ior": 1.75, "abbe": 32}
-    before = scene({**TENT, "material": "flint"}, materials={"flint": flint}, lights=LIGHTS)
+    before = scene({**TENT, "material": "flint", "double_sided": False}, materials={"flint": flint}, lights=LIGHTS)
     made = exported(before, store)
     assert lost(made) == {}
     after = again(made, store)
