@@ -228,21 +228,30 @@ def test_a_key_is_asked_for_and_a_full_server_waited_out(strict: Server, browser
 
 
 def test_a_cut_connection_takes_its_session_up_again(blank: Editor, server: Server) -> None:
-    editor = blank
-    editor.page.add_init_script("""
+    """Its picture goes on and does not begin anew."""
+    editor, page = blank, blank.page
+    page.add_init_script("""
         window.sockets = [];
         window.WebSocket = class extends WebSocket {
+            said = [];
             constructor(...all) { super(...all); window.sockets.push(this); }
+            send(text) { super.send(text); this.said.push(JSON.parse(text).type); }
         };
     """)
     editor.open(server.url)
-    editor.wait("samples", lambda: editor.samples() >= 8)
+    editor.tab("render")
+    entry = page.locator("#settings-form [data-field=max_samples] input")
+    entry.fill(str(1 << 20))  # a picture that is done before the cut would not go on
+    entry.press("Enter")
+    editor.wait("samples", lambda: editor.text("#samples").endswith("576") and editor.samples() >= 8)
     samples = editor.samples()
-    editor.page.evaluate("window.sockets.at(-1).close()")
-    editor.wait("another connection", lambda: editor.page.evaluate("window.sockets.length") > 1)
+    page.evaluate("window.sockets.at(-1).close()")
+    editor.wait("another connection", lambda: page.evaluate("window.sockets.length") > 1)
     editor.wait("the picture", lambda: editor.samples() > samples and editor.text("#messages") == "")
-    assert "session=" in editor.page.evaluate("window.sockets.at(-1).url")
-    assert editor.page.evaluate("window.sockets.length") == 2
+    assert "session=" in page.evaluate("window.sockets.at(-1).url")
+    assert page.evaluate("window.sockets.length") == 2
+    assert "start" in page.evaluate("window.sockets[0].said")
+    assert not {"start", "update"} & set(page.evaluate("window.sockets[1].said")), "nothing is told again"
 
 
 def test_a_session_that_another_tab_took_goes_on_when_asked(blank: Editor, server: Server) -> None:
