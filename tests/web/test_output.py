@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 from PIL import Image
-from playwright.sync_api import Locator, Route
+from playwright.sync_api import Locator, Page, Route, WebSocketRoute
 
 from service.images import read_metadata
 from tests.serving import Server
@@ -192,38 +193,60 @@ def test_a_render_is_opened_and_its_scene_again(editor: Editor) -> None:
     assert size(editor) == [64, 48]
 
 
-def test_a_noisy_picture_is_saved_now_or_when_it_is_clean(editor: Editor) -> None:
-    page = editor.page
+class Noise:
+    """A stream whose pictures say that they are noisy while `is_on`, however far the renderer is."""
+
+    def __init__(self, page: Page) -> None:
+        self.is_on = True
+        page.route_web_socket("**/v1/stream**", self._pass_on)
+
+    def _pass_on(self, route: WebSocketRoute) -> None:
+        def hear(message: str | bytes) -> None:
+            if self.is_on and isinstance(message, bytes):
+                end = 4 + int.from_bytes(message[:4], "little")
+                header = json.dumps(json.loads(message[4:end]) | {"noise": 0.5}).encode()
+                message = len(header).to_bytes(4, "little") + header + message[end:]
+            route.send(message)
+
+        route.connect_to_server().on_message(hear)
+
+
+def test_a_noisy_picture_is_saved_now_or_when_it_is_clean(blank: Editor, server: Server) -> None:
+    editor, page = blank, blank.page
+    noise = Noise(page)
+    editor.open(server.url)
     editor.tab("render")
     entry = page.locator("#settings-form [data-field=max_samples] input")
-    entry.fill("100000")
-    entry.press("Enter")
-    page.evaluate("document.activeElement.blur()")
-    page.keyboard.press("p")
     asked = page.get_by_role("dialog", name="noise: save now or when clean?")
+
+    def write_samples(count: int) -> None:
+        entry.fill(str(count))
+        entry.press("Enter")
+        page.evaluate("document.activeElement.blur()")  # where letters would be typed
+
+    write_samples(100_000)
+    editor.wait("samples", lambda: editor.text("#state") == "Converging")
+    page.keyboard.press("p")
     asked.get_by_role("button", name="When clean").click()
     waits = "The PNG is saved when the picture is clean."
-    assert waits in editor.text("#messages")
+    editor.wait("the words", lambda: waits in editor.text("#messages"))
     page.get_by_role("button", name="Cancel").click()
     editor.wait("silence", lambda: waits not in editor.text("#messages"))
     page.keyboard.press("p")
+    asked.get_by_role("button", name="When clean").click()
+    write_samples(2)
+    editor.wait("the words", lambda: "has changed" in editor.text("#messages"))
+    editor.wait("the end", lambda: editor.text("#state") == "Done")
     with page.expect_download() as waiting:
-        asked.get_by_role("button", name="When clean").click()
-        entry.fill("2")
-        entry.press("Tab")
-        editor.wait("the words", lambda: "has changed" in editor.text("#messages"))
-        editor.wait("the end", lambda: editor.text("#state") == "Done")
-        page.evaluate("document.activeElement.blur()")
         page.keyboard.press("p")  # of what gets no cleaner nobody is asked
-    assert re.fullmatch(r"Sphere-on-a-floor-\d+x\d+-\d+.png", waiting.value.suggested_filename)
-    entry.fill("100000")
-    entry.press("Tab")
-    page.evaluate("document.activeElement.blur()")
+    assert re.fullmatch(r"Sphere-on-a-floor-\d+x\d+-2.png", waiting.value.suggested_filename)
+    write_samples(100_000)
     editor.wait("samples", lambda: editor.text("#state") == "Converging")
     page.keyboard.press("p")
     with page.expect_download() as waiting:
         asked.get_by_role("button", name="When clean").click()
-    assert int(waiting.value.suggested_filename.split("-")[-1].removesuffix(".png")) > 1
+        noise.is_on = False
+    assert int(waiting.value.suggested_filename.split("-")[-1].removesuffix(".png")) > 2
 
 
 def test_a_table_of_colours_is_dropped_saved_and_removed(editor: Editor) -> None:
