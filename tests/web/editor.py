@@ -14,11 +14,12 @@ PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhil
 # Whether something comes to hold within some seconds: asked in the page, that costs next to nothing.
 SOON = """async (holds) => {
     const find = (selector) => document.querySelector(selector);
-    const samples = () => parseInt(find("#samples")?.innerText.split("/")[0].replace(/\\D/g, "") || "0");
+    // The text as it stands: as it is seen, the page would be laid out for each look.
+    const samples = () => parseInt(find("#samples")?.textContent.split("/")[0].replace(/\\D/g, "") || "0");
     const tests = {
         opened: () => samples() >= 1 && performance.getEntriesByName("all parts").length > 0,
         settled: () => find("#stage[aria-busy=false]") && !find("#preview").checkVisibility()
-            && (samples() >= 8 || find("#state").innerText === "Done"),
+            && (samples() >= 8 || find("#state").textContent === "Done"),
     };
     for (let i = 0; i < 200; i++) {
         if (tests[holds]()) return true;
