@@ -7,7 +7,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageOutput, ImageSpec
 from PIL import Image
-from playwright.sync_api import Route
+from playwright.sync_api import Browser, Route
 
 from tests.serving import Server
+from tests.web.conftest import COARSE, WINDOW
 from tests.web.editing import halves
 from tests.web.editor import Editor
 
 PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
+ANGLE = "#lobe input[type=range]"
 IS_DONE = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"
 
 
@@ -48,13 +50,34 @@ def table(editor: Editor) -> list[dict[str, float]]:
     return [{name: float(value) for name, value in row.items()} for row in rows]
 
 
-@pytest.fixture
-def lobe(editor: Editor) -> Editor:
-    """The editor with a pause in its picture and the panel open."""
+@pytest.fixture(scope="module")
+def opened(browser: Browser, server: Server) -> Iterator[Editor]:
+    """The editor with a pause in its picture and the panel open, for all tests of this file."""
+    context = browser.new_context(viewport=WINDOW, device_scale_factor=COARSE)
+    editor = Editor(context.new_page())
+    editor.open(server.url)
     editor.page.click("#pause")
     editor.page.click("#show-lobe")
     plotted(editor)
-    return editor
+    assert editor.page.input_value(ANGLE) == "45"
+    yield editor
+    context.close()
+
+
+@pytest.fixture
+def lobe(opened: Editor) -> Editor:
+    """The panel with the polar view of a new material, lit from 45 degrees, whatever the test before did."""
+    page = opened.page
+    page.unroute_all(behavior="ignoreErrors")
+    page.mouse.move(0, 0)
+    if page.is_visible("#comparison"):
+        page.click("#comparison >> text=Discard B")
+    paste(opened, {"type": "principled", "base_color": [0.8, 0.3, 0.2], "roughness": 0.3})
+    page.click("#lobe [data-value=polar]")
+    page.fill(ANGLE, "45")
+    plotted(opened)
+    opened.complaints.clear()
+    return opened
 
 
 def test_a_diffuse_lobe_is_a_half_circle_of_albedo_over_pi(lobe: Editor) -> None:
@@ -94,19 +117,17 @@ def test_hand_and_keys_turn_the_light(lobe: Editor) -> None:
     page = lobe.page
     box = page.locator(".lobe-plot").bounding_box()
     assert box is not None
-    angle = "#lobe input[type=range]"
-    assert page.input_value(angle) == "45"
     page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + 8)
     page.mouse.down()
-    assert float(page.input_value(angle)) < 5, "the light comes from where the hand is"
+    assert float(page.input_value(ANGLE)) < 5, "the light comes from where the hand is"
     page.mouse.move(box["x"] + 20, box["y"] + 0.8 * box["height"], steps=3)
     page.mouse.up()
-    assert float(page.input_value(angle)) > 60
-    at = float(page.input_value(angle))
+    assert float(page.input_value(ANGLE)) > 60
+    at = float(page.input_value(ANGLE))
     page.focus(".lobe-plot")
     page.keyboard.press("ArrowLeft")
-    assert float(page.input_value(angle)) == at - 1
-    page.fill(angle, "30")
+    assert float(page.input_value(ANGLE)) == at - 1
+    page.fill(ANGLE, "30")
     plotted(lobe)
     assert "for light from 30 degrees" in (page.get_attribute("#lobe svg", "aria-label") or "")
     view(lobe, "solid")
@@ -317,14 +338,18 @@ def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:
             await sleep(20);
             seen.add(document.querySelector("#lobe .curve").getAttribute("d"));
         }
+        window.fetch = real;
         return [seen.size, together];
     }""")
     assert seen == 5 and together == 1
     plotted(lobe)
 
 
-def test_kernels_of_other_models_are_there_before_they_are_chosen(lobe: Editor) -> None:
-    asked: list[tuple[str, str]] = []
+def test_kernels_of_other_models_are_there_before_they_are_chosen(editor: Editor) -> None:
+    lobe, asked = editor, list[tuple[str, str]]()
+    lobe.page.click("#pause")
+    lobe.page.click("#show-lobe")
+    plotted(lobe)
     lobe.page.on("request", lambda request: "/v1/bsdf" in request.url and asked.append(
         (request.url.rpartition("/v1/")[2], request.post_data_json["material"]["type"])))  # fmt: skip
     paste(lobe, {"type": "diffuse", "albedo": 0.5})
