@@ -45,15 +45,18 @@ def test_a_first_visit_is_light(browser: Browser, server: Server) -> None:
     context.close()
 
 
-@pytest.mark.parametrize(
-    ("code", "button", "shown"),
-    [("/lobe/panel.js", "#show-lobe", "#lobe h2"), ("/compare/comparison.js", "#compare", "#comparison select")],
-)
-def test_a_part_comes_when_a_hand_comes_near_its_button(editor: Editor, code: str, button: str, shown: str) -> None:
+PARTS = {
+    "/lobe/panel.js": ("#show-lobe", "#lobe h2"),
+    "/compare/comparison.js": ("#compare", "#comparison select"),
+}
+
+
+def test_a_part_comes_when_a_hand_comes_near_its_button(editor: Editor) -> None:
     page = editor.page
-    assert not [url for url in editor.requests if url.endswith(code)]
-    page.hover(button)
-    editor.wait("the part's code", lambda: any(url.endswith(code) for url in editor.requests))
-    page.click(button)
-    editor.wait("the part", lambda: page.locator(shown).first.is_visible())
+    for code, (button, shown) in PARTS.items():
+        assert not [url for url in editor.requests if url.endswith(code)]
+        page.hover(button)
+        editor.wait("the part's code", lambda code=code: any(url.endswith(code) for url in editor.requests))
+        page.click(button)
+        editor.wait("the part", lambda shown=shown: page.locator(shown).first.is_visible())
     assert editor.complaints == []
