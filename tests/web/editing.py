@@ -60,6 +60,19 @@ def finish(editor: Editor, samples: int) -> None:
     editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == samples)
 
 
+def keep_on(editor: Editor) -> None:
+    """Give the picture no end within reach: how soon it is done, and gets no more samples, depends on the machine."""
+    most = 1 << 20
+    editor.tab("render")
+    entry = editor.page.locator("#settings-form [data-field=max_samples] input")
+    entry.fill(str(most))
+    entry.press("Enter")
+    editor.tab("material")
+    editor.page.evaluate("document.activeElement.blur()")  # where letters would be typed
+    digits = lambda: "".join(filter(str.isdigit, editor.text("#samples")))  # noqa: E731
+    editor.wait("samples of so many", lambda: digits().endswith(str(most)) and editor.samples() >= 1)
+
+
 def halves(left: tuple[int, int, int] = (0, 220, 0)) -> bytes:
     """Green at the left unless told, dark blue at the right."""
     image = Image.new("RGB", (16, 16), left)

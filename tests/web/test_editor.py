@@ -13,7 +13,7 @@ from playwright.sync_api import BrowserContext
 
 from tests.serving import Server
 from tests.web.conftest import MortalServer
-from tests.web.editing import overlay
+from tests.web.editing import keep_on, overlay
 from tests.web.editor import Editor
 
 STAGE = "#stage"
@@ -165,17 +165,7 @@ def test_fingers_pinch_and_drag(visit: Callable[..., Editor]) -> None:
     editor.wait_for_change(before)
 
 
-def test_pause_stops_the_samples(editor: Editor) -> None:
-    editor.settled()
-    editor.page.keyboard.press("Space")
-    editor.wait("a pause", lambda: editor.text("#state") == "Paused")
-    editor.rest("the last frame", editor.samples)
-    before = editor.samples()
-    editor.page.click("#pause")
-    editor.wait("more samples", lambda: editor.samples() > before)
-
-
-def test_exposure_keeps_the_samples(editor: Editor) -> None:
+def test_exposure_keeps_the_samples_and_pause_stops_them(editor: Editor) -> None:
     before, samples = editor.settled(), editor.samples()
     editor.tab("film")
     entry = editor.page.locator(editor.field("exposure", "number"))
@@ -184,6 +174,14 @@ def test_exposure_keeps_the_samples(editor: Editor) -> None:
     editor.wait_for_change(before, 15)
     assert editor.samples() >= samples
     editor.page.select_option("#view-form select", "linear")
+    keep_on(editor)
+    editor.settled()
+    editor.page.keyboard.press("Space")
+    editor.wait("a pause", lambda: editor.text("#state") == "Paused")
+    editor.rest("the last frame", editor.samples)
+    samples = editor.samples()
+    editor.page.click("#pause")
+    editor.wait("more samples", lambda: editor.samples() > samples)
     assert editor.complaints == []
 
 

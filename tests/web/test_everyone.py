@@ -15,7 +15,7 @@ from websockets.typing import Subprotocol
 from gpu import Renderer
 from tests.marks import seldom
 from tests.serving import Server
-from tests.web.editing import camera
+from tests.web.editing import camera, keep_on
 from tests.web.editor import Editor
 
 SERIOUS = {"serious", "critical"}
@@ -125,16 +125,21 @@ SMALL = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [(390, 844, True), (844, 390, True), (1024, 768, False), (720, 450, False)])
-def test_letters_can_be_read_and_fingers_hit(visit: Callable[..., Editor], size: tuple[int, int, bool]) -> None:
+@pytest.mark.parametrize(
+    ("touch", "sizes"), [(True, [(390, 844), (844, 390)]), (False, [(1024, 768), (720, 450)])], ids=["touch", "mouse"]
+)
+def test_letters_can_be_read_and_fingers_hit(
+    visit: Callable[..., Editor], touch: bool, sizes: list[tuple[int, int]]
+) -> None:
     """A phone both ways, a tablet's size, and a laptop at 200 %."""
-    width, height, touch = size
-    editor = visit((width, height), scale=1, touch=touch)
+    editor = visit(sizes[0], scale=1, touch=touch)
     page = editor.page
     page.click("#compare")
-    for tab in ("film", "scene", "render", "view", "save", "material"):
-        editor.tab(tab)
-        assert page.evaluate(SMALL) == [], tab
+    for size in sizes:
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        for tab in ("film", "scene", "render", "view", "save", "material"):
+            editor.tab(tab)
+            assert page.evaluate(SMALL) == [], (size, tab)
 
 
 def test_the_keyboard_reaches_everything(editor: Editor) -> None:
@@ -166,6 +171,7 @@ def test_the_keyboard_reaches_everything(editor: Editor) -> None:
 
 
 def test_live_regions_do_not_chatter(editor: Editor) -> None:
+    keep_on(editor)
     editor.settled()
     editor.page.evaluate("""() => {
         window.spoken = 0;
@@ -239,11 +245,8 @@ def test_a_cut_connection_takes_its_session_up_again(blank: Editor, server: Serv
         };
     """)
     editor.open(server.url)
-    editor.tab("render")
-    entry = page.locator("#settings-form [data-field=max_samples] input")
-    entry.fill(str(1 << 20))  # a picture that is done before the cut would not go on
-    entry.press("Enter")
-    editor.wait("samples", lambda: editor.text("#samples").endswith("576") and editor.samples() >= 8)
+    keep_on(editor)
+    editor.wait("samples", lambda: editor.samples() >= 8)
     samples = editor.samples()
     page.evaluate("window.sockets.at(-1).close()")
     editor.wait("another connection", lambda: page.evaluate("window.sockets.length") > 1)

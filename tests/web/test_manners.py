@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import WebSocket
 
 from tests.serving import Server
+from tests.web.editing import keep_on
 from tests.web.editor import Editor
 
 HIDE = """(hidden) => {
@@ -82,7 +83,7 @@ def test_every_frame_is_acknowledged(wire: tuple[Editor, Wire]) -> None:
 
 def test_a_hidden_page_pauses(wire: tuple[Editor, Wire]) -> None:
     editor, heard = wire
-    editor.settled()
+    keep_on(editor)
     editor.page.evaluate(HIDE, True)
     editor.wait("a pause", lambda: "pause" in heard.kinds())
     editor.rest("the last frame", lambda: len(heard.frames))
