@@ -16,18 +16,9 @@ from tests.web.editor import Editor
 pytestmark = pytest.mark.browser
 
 
-def test_a_scene_leaves_as_glb_and_says_what_it_loses(editor: Editor, server: Server) -> None:
-    page = editor.page
-    made = editor.shot("#download-glb")
-    told = page.locator("#messages .export")
-    editor.wait("the losses", told.is_visible)
-    assert "no place" in told.inner_text() and "environment" in told.inner_text().lower()
-    assert "/scene" not in told.inner_text(), "places are in words"
-    answer = server.http.post("/v1/assets", content=made)
-    assert made[:4] == b"glTF" and answer.json()["kind"] == "scene"
-
-
-def test_a_program_makes_the_same_picture(editor: Editor, tmp_path: Path) -> None:
+def test_a_program_makes_the_same_picture_and_glb_says_what_it_loses(
+    editor: Editor, server: Server, tmp_path: Path
+) -> None:
     page, shown = editor.page, editor.shot("#download")
     page.click("#export")
     page.click("#copy-python")
@@ -38,3 +29,12 @@ def test_a_program_makes_the_same_picture(editor: Editor, tmp_path: Path) -> Non
     subprocess.run([sys.executable, path], cwd=tmp_path, check=True, timeout=120)
     with Image.open(tmp_path / "sunbox.png") as picture, Image.open(io.BytesIO(shown)) as own:
         assert picture.size == own.size
+    page.keyboard.press("Escape")
+
+    made = editor.shot("#download-glb")
+    told = page.locator("#messages .export")
+    editor.wait("the losses", told.is_visible)
+    assert "no place" in told.inner_text() and "environment" in told.inner_text().lower()
+    assert "/scene" not in told.inner_text(), "places are in words"
+    answer = server.http.post("/v1/assets", content=made)
+    assert made[:4] == b"glTF" and answer.json()["kind"] == "scene"

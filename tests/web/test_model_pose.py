@@ -25,10 +25,16 @@ def model() -> bytes:
 
 def test_it_is_opened_in_the_pose_that_is_chosen(editor: Editor, model: bytes) -> None:
     editor.settled()
-    page = editor.page
+    page, before = editor.page, document(editor)
+    dialog = page.get_by_role("dialog", name="How is square.glb taken?")
+    editor.drop("#stage", {"square.glb": model})
+    page.click("dialog[open] [value=add]")
+    dialog.get_by_role("button", name="Cancel").click()
+    editor.settled()
+    assert document(editor) == before, "who thinks better of it keeps the scene"
+
     editor.drop("#stage", {"square.glb": model})
     page.click("dialog[open] [value=open]")
-    dialog = page.get_by_role("dialog", name="How is square.glb taken?")
     picture = dialog.get_by_role("img")
     editor.wait("its picture", lambda: picture.evaluate("(image) => image.naturalWidth") == 320)
     assert not dialog.get_by_role("slider").is_visible(), "at rest there is no time"
@@ -43,14 +49,3 @@ def test_it_is_opened_in_the_pose_that_is_chosen(editor: Editor, model: bytes) -
     assert shape["material"] == "red" and shape["transform"]["matrix"][3] == 1.5
     assert ground["type"] == "quad", "it stands on a ground where it is now"
     assert editor.complaints == []
-
-
-def test_who_thinks_better_of_it_keeps_the_scene(editor: Editor, model: bytes) -> None:
-    editor.settled()
-    before = document(editor)
-    editor.drop("#stage", {"square.glb": model})
-    editor.page.click("dialog[open] [value=add]")
-    dialog = editor.page.get_by_role("dialog", name="How is square.glb taken?")
-    dialog.get_by_role("button", name="Cancel").click()
-    editor.settled()
-    assert document(editor) == before

@@ -8,24 +8,6 @@ from tests.web.editing import document, point
 from tests.web.editor import Editor
 
 
-def test_things_stand_on_a_ground(editor: Editor) -> None:
-    editor.pick("scenes", "point-lights")
-    editor.wait("the scene", lambda: editor.text("#scene-title") == "Two point lights")
-    editor.outline(True)
-    before = document(editor)
-    editor.page.select_option("#add", label="Ground")
-    editor.wait("the ground", lambda: "Stage" in editor.text("#outline-list"))
-    ground = document(editor)["shapes"][-1]
-    assert ground["type"] == "quad" and ground["origin"][1] == pytest.approx(0, abs=1e-5)
-    editor.page.select_option("#add", label="Ground")
-    editor.wait("it again", lambda: document(editor)["shapes"][-1]["name"] == "Stage")
-    assert len(document(editor)["shapes"]) == len(before["shapes"]) + 1, "there is one at most"
-    assert len(document(editor)["materials"]) == len(before["materials"]) + 1
-    editor.page.click("#undo")  # once: the second ground was the first one again
-    assert document(editor)["shapes"] == before["shapes"]
-    assert editor.text("#messages") == ""
-
-
 def stage(editor: Editor, kind: str) -> None:
     """Choose what things stand on."""
     if not editor.page.is_visible("#stage-menu"):
@@ -42,6 +24,18 @@ def test_one_switch_says_what_things_stand_on(editor: Editor) -> None:
     editor.wait("the scene", lambda: editor.text("#scene-title") == "Two point lights")
     editor.outline(True)
     before = document(editor)
+    page.select_option("#add", label="Ground")
+    editor.wait("the ground", lambda: "Stage" in editor.text("#outline-list"))
+    ground = document(editor)["shapes"][-1]
+    assert ground["type"] == "quad" and ground["origin"][1] == pytest.approx(0, abs=1e-5)
+    page.select_option("#add", label="Ground")
+    editor.wait("it again", lambda: document(editor)["shapes"][-1]["name"] == "Stage")
+    assert len(document(editor)["shapes"]) == len(before["shapes"]) + 1, "there is one at most"
+    assert len(document(editor)["materials"]) == len(before["materials"]) + 1
+    page.click("#undo")  # once: the second ground was the first one again
+    assert document(editor)["shapes"] == before["shapes"]
+    assert editor.text("#messages") == ""
+
     page.click("#stage-button")
     editor.wait("the menu", lambda: page.get_by_role("radio", name="None", exact=True).is_checked())
     assert page.get_by_label("Backdrop colour").is_hidden()
