@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer
+from gpu import Picture, Renderer, RenderSettings
+from gpu.kernels.features import traces_caustics
 from tests.families import EXACT
 from tests.marks import seldom
 from tests.rendering import document, picture
@@ -167,6 +168,13 @@ def test_a_spot_and_the_sun_of_a_sky_bring_what_a_point_and_a_sun_bring(gpu: Ren
             direct = direct - picture(gpu, dome, 64, max_bounces=1, **small).read()[..., :3].mean(axis=(0, 1))
         shares.append(brought / direct)
     np.testing.assert_allclose(*shares, rtol=0.02)
+
+
+def test_paths_of_light_are_traced_where_the_setting_says_so() -> None:
+    raised = {"HAS_CAUSTICS", "HAS_SHARP_CAUSTICS"}
+    traced = {way: traces_caustics(raised, RenderSettings(8, 8, caustics=way)) for way in ("auto", "light", "paths")}
+    assert traced == {"auto": True, "light": True, "paths": False}
+    assert not traces_caustics({"HAS_CAUSTICS"}, RenderSettings(8, 8, caustics="auto"))
 
 
 WIDE_SUN = SUN | {"angular_diameter": 20}
