@@ -226,8 +226,7 @@ def test_the_slice_is_an_image(lobe: Editor) -> None:
         const { data } = document.querySelector("#lobe canvas").getContext("2d").getImageData(0, 0, 96, 96);
         return [Math.min(...data), Math.max(...data.filter((_, i) => i % 4 < 3))];
     }""")
-    linear = 0.5 / math.pi
-    assert grey == [pytest.approx(255 * (1.055 * linear ** (1 / 2.4) - 0.055), abs=1)] * 2
+    assert grey == [pytest.approx(255 * (1.055 * (0.5 / math.pi) ** (1 / 2.4) - 0.055), abs=1)] * 2
 
 
 def test_a_plot_leaves_as_a_file_of_its_own(lobe: Editor) -> None:
@@ -347,7 +346,6 @@ def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:
 
 def test_kernels_of_other_models_are_there_before_they_are_chosen(editor: Editor) -> None:
     lobe, asked = editor, list[tuple[str, str]]()
-    lobe.page.click("#pause")
     lobe.page.click("#show-lobe")
     plotted(lobe)
     lobe.page.on("request", lambda request: "/v1/bsdf" in request.url and asked.append(
@@ -386,12 +384,8 @@ def test_an_old_plot_is_dimmed_until_the_new_one_is_there(lobe: Editor) -> None:
     assert page.evaluate("getComputedStyle(document.querySelector('#lobe svg')).opacity") == "1"
 
 
-@pytest.fixture
-def phone(visit: Callable[..., Editor]) -> Editor:
-    return visit((390, 844), scale=1, touch=True)
-
-
-def test_a_phone_shows_the_lobe_in_the_pictures_place(phone: Editor) -> None:
+def test_a_phone_shows_the_lobe_in_the_pictures_place(visit: Callable[..., Editor]) -> None:
+    phone = visit((390, 844), scale=1, touch=True)
     page = phone.page
     page.tap("#show-lobe")
     plotted(phone)
