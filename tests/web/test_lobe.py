@@ -69,7 +69,6 @@ def lobe(opened: Editor) -> Editor:
     """The panel with the polar view of a new material, lit from 45 degrees, whatever the test before did."""
     page = opened.page
     page.unroute_all(behavior="ignoreErrors")
-    page.mouse.move(0, 0)
     if page.is_visible("#comparison"):
         page.click("#comparison >> text=Discard B")
     paste(opened, {"type": "principled", "base_color": [0.8, 0.3, 0.2], "roughness": 0.3})
@@ -346,6 +345,7 @@ def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:
 
 def test_kernels_of_other_models_are_there_before_they_are_chosen(editor: Editor) -> None:
     lobe, asked = editor, list[tuple[str, str]]()
+    lobe.page.click("#pause")
     lobe.page.click("#show-lobe")
     plotted(lobe)
     lobe.page.on("request", lambda request: "/v1/bsdf" in request.url and asked.append(
