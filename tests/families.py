@@ -51,8 +51,8 @@ _TEXTURES = _flags("TEXTURES BYTE_TEXELS FLOAT_TEXELS SRGB_TEXELS CHECKERS UVS V
 _BUMPS = _TEXTURES | _flags("NORMAL_MAPS HEIGHTS COAT_NORMALS")
 _MICROFACETS = frozenset(name for name in FLAGS if name.startswith("HAS_MICROFACET"))
 _MEDIA = _flags("MEDIA SCATTERING GLOWING_MEDIA STRAIGHT LIGHT_TREE")
-# A scene is of the first of these that has all of its flags. What several have together costs LLVM more than the sum of
-# what each adds: a film with lamps, or layers in a tree of every kind of shape, over a minute. Scenes of such things
+# A scene is of the first of these that has all of its flags. What several have together costs LLVM more than the sum
+# of what each adds: a film with lamps, or layers in a tree of every kind of shape, over a minute. Scenes of such things
 # keep kernels with their own flags, of 5 to 10 s. `PRIORITIES` is nowhere: it says what a scene means.
 FAMILIES: dict[str, frozenset[str]] = {
     "matte": _BASE,
@@ -97,7 +97,8 @@ def family(raised: frozenset[str]) -> frozenset[str]:
 def spread(textures: TextureArrays, raised: frozenset[str]) -> TextureArrays:
     """The same textures, where members have slots of their own: those that are textured often at the same places in
     all scenes, with empty slots where this one does not texture them."""
-    bumps = [*texture_records.NORMALS, texture_records.HEIGHT] if "HAS_NORMAL_MAPS" in raised or "HAS_HEIGHTS" in raised else []
+    has_bumps = not raised.isdisjoint(("HAS_NORMAL_MAPS", "HAS_HEIGHTS"))
+    bumps = [*texture_records.NORMALS, texture_records.HEIGHT] if has_bumps else []
     wanted = dict.fromkeys([*_TEXTURED, *bumps, *textures.slots])
     members = sorted(wanted, key=lambda name: name in textures_glsl.APART)  # these come last
     slots, uses = textures_glsl.records(textures)

@@ -76,8 +76,8 @@ def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "
 
 
 def assert_estimators_agree(gpu: Renderer, scene: dict[str, Any], max_bounces: int = 3, within: float = 0.01) -> None:
-    """That estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and in the
-    mean. `mis` draws as `bsdf` and `light` do, which `make long-test` tries alone."""
+    """That estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and in
+    the mean. `mis` draws as `bsdf` and `light` do, which `make long-test` tries alone."""
     images, errors = [], []
     for estimator in ESTIMATORS if EXACT else ("mis", "uniform"):
         made = picture(gpu, scene, 1024, estimator=estimator, max_bounces=max_bounces, sampler="independent")
