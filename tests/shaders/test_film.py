@@ -29,7 +29,7 @@ def prober(gpu: Renderer) -> Prober:
 def _mirrored(prober: Prober, m: np.ndarray, cosines: np.ndarray, inside: int = 0) -> np.ndarray:
     """What a smooth surface mirrors (rgb) of light at each cosine: its sample at u_lobe 0."""
     pbr = m["model"][0] == NUMBERS["openpbr"]
-    flags = (OPENPBR_FLAGS if pbr else PRINCIPLED_FLAGS) | {"HAS_FILM", "HAS_CONDUCTOR"}
+    flags = (OPENPBR_FLAGS if pbr else PRINCIPLED_FLAGS) | rare(m) | {"HAS_FILM", "HAS_CONDUCTOR"}
     n = len(cosines)
     asks = np.zeros((2 * n, 4), np.float32)
     asks[n:, 0], asks[n:, 2] = np.sqrt(1 - cosines**2), cosines

@@ -161,19 +161,19 @@ def test_half_spaces_show_what_chandrasekhar_says(gpu: Renderer, albedo: float) 
     medium = {"absorption": 1 - albedo, "scattering": albedo}
     body = {**HALF_SPACE, "medium": medium}
     expected = 1 - h_function(np.array([albedo]), 1.0)[0] * math.sqrt(1 - albedo)
-    image = seen(gpu, [body], 1024 if albedo < 0.5 else 256, environment=WHITE, max_bounces=512)
+    image = seen(gpu, [body], 1024 if albedo < 0.5 else 128, environment=WHITE, max_bounces=512)
     np.testing.assert_allclose(image.mean(), expected, rtol=0.01)
     mu = 0.6
     sun = {"type": "directional", "direction": [0.8, 0, -mu], "irradiance": math.pi}
     h = h_function(np.array([albedo]), 1.0)[0] * h_function(np.array([albedo]), mu)[0]
-    image = seen(gpu, [body], 256, lights=[sun], max_bounces=512)
+    image = seen(gpu, [body], 128, lights=[sun], max_bounces=512)
     np.testing.assert_allclose(image.mean(), albedo / 4 * mu / (1 + mu) * h, rtol=0.01)
 
 
 @pytest.mark.parametrize("g", [0.0, 0.6])
 def test_the_colour_of_much_is_the_one_that_was_asked_for(gpu: Renderer, g: float) -> None:
     medium = {"albedo": [0.8, 0.5, 0.1], "radius": [0.1, 1.0, 0.3], "g": g}
-    image = seen(gpu, [{**HALF_SPACE, "medium": medium}], 256, environment=WHITE, max_bounces=512)
+    image = seen(gpu, [{**HALF_SPACE, "medium": medium}], 128, environment=WHITE, max_bounces=512)
     np.testing.assert_allclose(image, medium["albedo"], atol=0.03 if g else 0.01)
     assert single_scattering_albedo(0.0, g) == 0 and single_scattering_albedo(1.0, g) == 1
 
