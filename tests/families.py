@@ -156,7 +156,7 @@ class FamilyScene(Scene):
         groups = layout.Material.words // 4 + textures_glsl.groups(textures)
         fits = _MATERIALS * 16 * groups <= 16384 and len(self.arrays.materials) <= _MATERIALS
         counts["MATERIAL_COUNT"] = _MATERIALS if fits else 0
-        choices = features.choices_from_uniforms() | features.SOON | {"HAS_CLAMP": 1}
+        choices = features.choices_from_uniforms() | {"HAS_CLAMP": 1, "SHADE_ONCE": 1}
         return features.defines(self._raised, settings, counts) | choices
 
 
