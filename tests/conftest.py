@@ -30,7 +30,9 @@ TESTS = Path(__file__).parent
 # The files that take longest, in this order: begun last, one of them would leave a core without work.
 LONG_FILES = (
     "web/test_editor.py", "web/test_saving.py", "web/test_everyone.py", "web/test_lobe.py", "web/test_picture.py",
-    "web/test_variants.py", "shaders/test_furnace.py", "gpu/test_fallback.py",
+    "web/test_variants.py", "shaders/test_furnace.py", "gpu/test_bsdf.py", "gpu/test_instances.py",
+    "extremes/test_radiance.py", "service/rendering/test_untouched_parts.py", "gpu/test_flags.py",
+    "gpu/test_fallback.py",
     "service/rendering/test_survival.py", "service/rendering/test_durable.py", "shaders/test_light.py",
     "gpu/test_precompile.py", "service/pack/test_tangents.py", "service/bench/test_bench.py", "client/test_agents.py",
     "service/test_hostile.py", "service/rendering/test_divided.py", "client/test_batch.py", "service/test_rest.py",

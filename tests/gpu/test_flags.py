@@ -68,8 +68,8 @@ def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> 
     ("name", "more"),
     [
         ("TEXTURES", ["TRANSMISSION"]),
-        ("TRIANGLES", ["TEXTURES", "VERTEX_COLORS"]),
-        ("TRANSMISSION", ["THIN_WALLS", "STRAIGHT"]),
+        pytest.param("TRIANGLES", ["TEXTURES", "VERTEX_COLORS"], marks=pytest.mark.slow),
+        pytest.param("TRANSMISSION", ["THIN_WALLS", "STRAIGHT"], marks=pytest.mark.slow),
     ],
 )
 def test_a_flag_more_shows_the_same(gpu: Renderer, name: str, more: list[str]) -> None:
@@ -85,7 +85,11 @@ CHECKS = {"type": "checker", "a": 0.1, "b": 0.9}
 
 @pytest.mark.parametrize("estimator", seldom(["mis", "light"], ["light"]))
 @pytest.mark.parametrize(
-    "more", [{}, {"attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}, {"alpha": 0.5}, {"base_color": T}]
+    "more",
+    [
+        {"attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1},
+        *(pytest.param(more, marks=pytest.mark.slow) for more in ({}, {"alpha": 0.5}, {"base_color": T})),
+    ],
 )
 def test_paths_go_through_mirrors_as_they_are_scattered(
     gpu: Renderer, monkeypatch: pytest.MonkeyPatch, more: Doc, estimator: Any
