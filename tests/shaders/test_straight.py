@@ -19,8 +19,6 @@ from tests.extremes.scenes import ball
 from tests.marks import BY_ESTIMATOR, seldom
 from tests.rendering import Images, assert_estimators_agree, document, render
 
-pytestmark = pytest.mark.exact
-
 Doc = dict[str, Any]
 CAMERA = {"position": [0, -1, 0.4], "target": [0, 0, 0], "vfov": 0.02}
 FLOOR = {"type": "quad", "origin": [-0.05, -0.05, 0], "u": [0.1, 0, 0], "v": [0, 0.1, 0], "material": "floor"}

@@ -13,8 +13,6 @@ from tests.extremes.scenes import icosphere
 from tests.normal_maps import facing
 from tests.rendering import Images, assert_estimators_agree, document, render
 
-pytestmark = pytest.mark.exact
-
 SIZE = 96
 CAMERA = {"position": [0, 0, 40], "target": [0, 0, 0], "vfov": 3}
 BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}

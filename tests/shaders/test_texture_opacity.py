@@ -14,8 +14,6 @@ from service.pack import pack
 from service.scene import parse_scene
 from tests.rendering import Images, document
 
-pytestmark = pytest.mark.exact
-
 RNG = np.random.default_rng(9)
 IMAGES = {
     "color": RNG.integers(0, 256, (4, 4, 3)).astype(np.uint8),

@@ -13,8 +13,6 @@ from service.scene import parse_scene
 from tests.light_trees import nodes_of, ways
 from tests.rendering import Images, document, render
 
-pytestmark = pytest.mark.exact
-
 STRIPES = np.zeros((2, 4, 3), np.float32)
 STRIPES[:, 0], STRIPES[:, 2] = [8, 2, 0], [0, 1, 6]
 ASSETS = Images(s=STRIPES)

@@ -24,8 +24,6 @@ from tests.probing import PROBES
 from tests.rendering import Images, document, render
 from tests.shaders.textured import BALL, BARE, BOX, QUAD, at, on_ball
 
-pytestmark = pytest.mark.exact
-
 Doc = dict[str, Any]
 RNG = np.random.default_rng(6)
 IMAGES = {

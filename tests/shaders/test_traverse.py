@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from gpu import Renderer, RenderSettings
 from service.pack import pack
 from service.pack.geometry import scene_bvh
 from service.scene import parse_scene
 from tests.documents import Shelf, box, document, mesh, quad, sphere
-
-pytestmark = pytest.mark.exact
 
 
 def crowd():

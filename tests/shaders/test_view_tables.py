@@ -13,8 +13,6 @@ from service.images import icc
 from service.worker.view import view_tables
 from tests.rendering import document, picture
 
-pytestmark = pytest.mark.exact
-
 SIDE = 96
 ACES2 = displays.SHORT["aces2"][0]
 

@@ -13,8 +13,6 @@ from tests.extremes.scenes import ball, icosphere, quad
 from tests.marks import seldom
 from tests.rendering import assert_estimators_agree, document, picture, render
 
-pytestmark = pytest.mark.exact
-
 Doc = dict[str, Any]
 WHITE = {"environment": {"type": "constant", "radiance": 1}}
 HALF_SPACE = [{"type": "box", "min": [-9, -9, -18], "max": [9, 9, 0], "material": "m"}]

@@ -16,8 +16,6 @@ from tests.marks import BY_ESTIMATOR, seldom
 from tests.probing import OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, openpbr, prober_of
 from tests.rendering import document, render
 
-pytestmark = pytest.mark.exact
-
 PRINCIPLED = NUMBERS["principled"]
 WALLS = frozenset({"HAS_THIN_WALLS"})
 FLAGS = {PRINCIPLED: PRINCIPLED_FLAGS | WALLS, NUMBERS["openpbr"]: OPENPBR_FLAGS | WALLS}
