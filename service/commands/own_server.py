@@ -23,7 +23,7 @@ ENDS_S = 20.0  # for a server that ends
 PROGRAM = """
 import sys
 from service.cli import main
-from service.worker.helpers.lifeline import end_with
+from service.system.lifeline import end_with
 if end_with(int(sys.argv[1])):
     sys.exit(main(["serve", "--host", "127.0.0.1", "--port", "0"]))
 """

@@ -1,4 +1,4 @@
-"""The process that parses large JSON bodies: `python -m service.requests.parser_child FD`, FD being a link.
+"""The process that parses large JSON bodies: `python -m service.requests.parser_child FD LIFELINE`, FD being a link.
 
 The C scanner and pydantic keep all other threads of their process waiting, seconds for some bodies. Here nobody
 waits, and what takes too much memory or time is ended. It ends with its parent, and when nothing came for a while.
@@ -7,7 +7,6 @@ waits, and what takes too much memory or time is ended. It ends with its parent,
 from __future__ import annotations
 
 import gc
-import socket
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +45,7 @@ def main() -> None:
     end.settimeout(IDLE_S)
     while True:
         try:
-            answer = _answer(channel.receive(end, wait=True), end)
+            answer = _answer(channel.receive(end, wait=True))
             channel.send(end, answer, sealed=True)
         except (channel.Closed, TimeoutError):
             return
@@ -55,9 +54,9 @@ def main() -> None:
         trim()
 
 
-def _answer(work: Work, end: socket.socket) -> Any:
+def _answer(work: Work) -> Any:
     try:
-        with bounded(end, BASE_BYTES + TIMES * work.memory, work.seconds):
+        with bounded(BASE_BYTES + TIMES * work.memory, work.seconds):
             return PARSERS[work.kind](work.config, work.body)
     except ServiceError as error:
         return error

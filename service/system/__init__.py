@@ -2,6 +2,7 @@
 
 child_processes  children that parse strangers' files, as the service starts and ends them; what children inherit
 confined         what such a child gives up before it reads anything
+lifeline         a process ends when another one does
 cpu_time         how long a process was able to run
 shared_memory    arrays that another process may map
 memory           one budget of memory for all work

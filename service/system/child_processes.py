@@ -49,23 +49,31 @@ class Closed(Exception):
 
 
 class Child:
-    """`python -m MODULE DESCRIPTOR`, the descriptor being its end of a socket of whole messages, `link` ours.
+    """`python -m MODULE DESCRIPTOR LIFELINE`, the descriptor being its end of a socket of whole messages, `link`
+    ours, and the lifeline the end of a pipe that nobody writes to: it ends with the other end, which is ours.
 
     Its first message says which rights it has given up. `is_spent` is set where it should get no more work.
     """
 
     def __init__(self, module: str, environment: dict[str, str], is_quiet: bool) -> None:
         self.link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
+        line, self._lifeline = os.pipe()
+        try:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", module, str(theirs.fileno())],
+                [sys.executable, "-m", module, str(theirs.fileno()), str(line)],
                 cwd=ROOT,
                 env=inherited_environment() | THREADS | environment,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[theirs.fileno(), line],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL if is_quiet else None,
             )
+        except BaseException:
+            os.close(self._lifeline)
+            raise
+        finally:
+            theirs.close()
+            os.close(line)
         self.is_spent = False
         self.given = 0  # how often it got work
         self._rights: Rights | None = None
@@ -93,6 +101,9 @@ class Child:
         self.process.kill()
         self.process.wait()
         self.link.close()
+        if self._lifeline >= 0:
+            os.close(self._lifeline)
+            self._lifeline = -1
 
 
 class Children:

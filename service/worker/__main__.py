@@ -15,8 +15,8 @@ from service.ipc.heartbeat import Heartbeat
 from service.ipc.messages import Ready, Unable
 from service.logs import setup
 from service.system.confined import hide
+from service.system.lifeline import end_with
 from service.system.priority import raise_process_niceness
-from service.worker.helpers.lifeline import end_with
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
 NICENESS = 10  # steps above the server's: its event loop and encoders come first, before llvmpipe's threads too

@@ -344,7 +344,7 @@ def is_there(pid: int) -> bool:
 def test_the_other_end_of_a_pipe_is_a_lifeline() -> None:
     """Of two that share it, in the middle of a loop that never looks."""
     read, write = os.pipe()
-    program = "import sys\nfrom service.worker.helpers.lifeline import end_with_pipe\n"
+    program = "import sys\nfrom service.system.lifeline import end_with_pipe\n"
     program += "print(end_with_pipe(int(sys.argv[1])), flush=True)\nwhile True: pass"
     command = [sys.executable, "-c", program, str(read)]
     both = [subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True) for _ in range(2)]

@@ -20,7 +20,7 @@ import pytest
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.types import AssetLimits
 from service.system.child_processes import ROOT, Children, inherited_environment
-from service.system.confined import Rights, seccomp
+from service.system.confined import Rights, rights, seccomp
 from service.system.confined.landlock import RIGHTS
 from service.system.confined.system_calls import AUDIT_ARCH, READING, system_calls
 from tests import privileges
@@ -314,3 +314,12 @@ def numbers(header: Path) -> dict[str, int]:
 
 def test_every_version_of_landlock_refuses_what_it_knows() -> None:
     assert list(RIGHTS) == sorted(RIGHTS) and list(RIGHTS.values()) == sorted(RIGHTS.values())
+
+
+def test_packages_are_read_where_they_were_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By `pip install --user` or `--target` as well, which sysconfig does not know; no other folder of the path."""
+    packages, other = tmp_path / "packages", tmp_path / "other"
+    (packages / "pydantic-2.0.dist-info").mkdir(parents=True)
+    other.mkdir()
+    monkeypatch.setattr(sys, "path", [*sys.path, str(packages), str(other)])
+    assert packages in list(rights.readable()) and other not in list(rights.readable())

@@ -9,7 +9,6 @@ import errno
 import json
 import mmap
 import os
-import socket
 from typing import Any
 
 import numpy as np
@@ -49,7 +48,7 @@ def main() -> None:
             is_capped = True
         large = os.fstat(source).st_size > LARGE
         with collector_paused():
-            reply, result = _answer(request, source, link)
+            reply, result = _answer(request, source)
         os.close(source)
         if large:
             trim()
@@ -61,10 +60,10 @@ def main() -> None:
             os.close(result)
 
 
-def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[dict[str, Any], int]:
+def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
     limits = AssetLimits(**request["limits"])
     try:
-        with bounded(link, request["memory"], limits.seconds):
+        with bounded(request["memory"], limits.seconds):
             parsed = _parse(request["format"], source, limits, request["whole"], Pose(**request["pose"]))
             arrays, facts = _arrays(parsed)
             del parsed

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import importlib
 import json
-import os
 import socket
 import sys
 from collections.abc import Iterable, Iterator
@@ -14,14 +12,19 @@ from dataclasses import asdict
 
 from service.system.confined.limits import bound, confine, unbind
 from service.system.confined.rights import renounce
+from service.system.lifeline import end_with_pipe
 
 
 def begin(niceness: int, modules: Iterable[str] = ()) -> socket.socket:
-    """The socket to the parent, whose descriptor is the child's first argument. The child has given up all rights
-    that it does not need, and has sent the parent their list. Before, while it could open files, it has imported
-    `modules`.
+    """The socket to the parent, whose descriptor is the child's first argument. The second is a pipe's, whose other
+    end the parent holds: the child ends with it, even inside a library's loop. The child has given up all rights that
+    it does not need, and has sent the parent their list. Before, while it could open files, it imported `modules`.
     """
     link = socket.socket(fileno=int(sys.argv[1]))
+    # Not by a signal from `link`: the one that a message sends may come when the message has been read, and work on
+    # it has begun.
+    if not end_with_pipe(int(sys.argv[2])):
+        sys.exit()
     for name in modules:
         importlib.import_module(name)
     link.sendmsg([json.dumps(asdict(renounce(confine(niceness)))).encode()])
@@ -29,15 +32,11 @@ def begin(niceness: int, modules: Iterable[str] = ()) -> socket.socket:
 
 
 @contextmanager
-def bounded(link: socket.socket, memory: int, seconds: float) -> Iterator[None]:
+def bounded(memory: int, seconds: float) -> Iterator[None]:
     """A context in which the child may take no more than this many bytes beyond what it has and seconds of processor
-    time, and which ends with the parent."""
+    time."""
     try:
         bound(memory, seconds)
-        # A signal when the parent hangs up, which ends the process by default, even inside a library's loop.
-        fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
         yield
     finally:
-        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) & ~os.O_ASYNC)
         unbind()

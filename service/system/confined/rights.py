@@ -64,6 +64,7 @@ def readable() -> Iterator[Path]:
     """Python, its packages, this one's modules, and shared libraries."""
     paths = sysconfig.get_paths()
     yield from (Path(paths[name]) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
+    yield from (Path(folder) for folder in sys.path if any(Path(folder).glob("*.dist-info")))  # --user, --target
     yield Path(sys.base_prefix) / "lib"
     yield ROOT / "service"
     yield from map(Path, ("/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib", "/etc/ld.so.cache"))

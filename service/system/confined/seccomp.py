@@ -22,7 +22,7 @@ CLONE_THREAD = 0x10000
 # Flags of open that write: O_WRONLY and O_RDWR, O_CREAT, O_TRUNC, the bit of O_TMPFILE; the same on both processors.
 WRITING = 0o3 | 0o100 | 0o1000 | 0o20000000
 F_DUPFD_CLOEXEC, F_ADD_SEALS, F_GET_SEALS = 1030, 1033, 1034
-# No F_SETSIG and F_SETOWN_EX: with them a process has the kernel signal others.
+# No F_SETOWN, F_SETOWN_EX and F_SETSIG: with them a process has the kernel signal others.
 DESCRIPTORS = (
     fcntl.F_DUPFD, fcntl.F_GETFD, fcntl.F_SETFD, fcntl.F_GETFL, fcntl.F_SETFL, fcntl.F_GETOWN,
     F_DUPFD_CLOEXEC, F_ADD_SEALS, F_GET_SEALS,
@@ -56,10 +56,8 @@ def program(calls: SystemCalls, process: int) -> list[Instruction]:
         lines += _case(number["open"], _bits(1, WRITING, 0), REFUSE | errno.EACCES)
     lines += _case(number["openat"], _bits(2, WRITING, 0), REFUSE | errno.EACCES)
     lines += _case(number["clone"], _bits(0, CLONE_THREAD, CLONE_THREAD), refused)  # threads, but no processes
-    own = [(LOAD, 0, 0, ARGUMENTS + 8), (EQUAL, 0, 3, fcntl.F_SETOWN), *_same(2, process)]
-    for command in DESCRIPTORS:
-        own += [(LOAD, 0, 0, ARGUMENTS + 8), (EQUAL, 0, 1, command), (RETURN, 0, 0, ALLOW)]
-    lines += _case(number["fcntl"], own, refused)
+    plain = [test for command in DESCRIPTORS for test in _same(1, command)]
+    lines += _case(number["fcntl"], plain, refused)
     lines += _case(number["sendto"], _null(4), refused)  # to no address but the connected one
     lines += _case(number["tgkill"], _same(0, process), refused)
     lines += _case(number["prlimit64"], _same(0, 0), refused)

@@ -1,7 +1,6 @@
 """Processes beside the renderer, for work that must not hold it up.
 
 process         one such process, started on demand
-lifeline        a helper ends when its renderer does
 compile_client  asks for kernels to be compiled, and knows which are
 kernel_wait     one kernel that a task waits for
 compile_main    compiles kernels: `python -m service.worker.helpers.compile_main`

@@ -21,9 +21,9 @@ from typing import get_args
 
 from service.ipc import channel
 from service.system.confined import hide
+from service.system.lifeline import end_with, end_with_pipe, hung_up
 from service.system.priority import HIGHEST, raise_thread_niceness
 from service.worker.helpers.compile_client import Compiled, Priority, records
-from service.worker.helpers.lifeline import end_with, end_with_pipe, hung_up
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
 LOCKS: dict[Priority, str] = {"now": ".lock", "soon": ".soon", "spare": ".spare"}  # endings of the files

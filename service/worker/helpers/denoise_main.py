@@ -13,8 +13,8 @@ import socket
 
 from service.ipc import channel
 from service.system.confined import hide
+from service.system.lifeline import end_with
 from service.worker.helpers.denoise_client import DenoiseRequest, DenoiseResult
-from service.worker.helpers.lifeline import end_with
 
 NICENESS = 19  # the renderer is at 10: where both want the processor, this one gets an eighth of it
 IDLE_S = 60.0  # then it ends, and gives back what the library holds (some 200 MB)

@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -26,6 +27,7 @@ from service.requests.parser_pool import ParserPool
 from service.requests.request_parser import RequestParser, unfolded
 from service.scene import MeshShape, load_json
 from service.scene.text import most_bytes, weigh
+from service.system.child_processes import Child
 from tests.serving import SCENE, SMALL
 
 ROWS = [[0.5 * i, i % 7, -1e-3 * i] for i in range(3000)]
@@ -63,6 +65,31 @@ def test_a_request_is_understood_as_in_the_service(pool: ParserPool) -> None:
     mesh = found.scene.shapes[-1]
     assert isinstance(mesh, MeshShape) and mesh.vertices is not None
     assert np.array_equal(mesh.vertices, np.array(ROWS)) and not mesh.vertices.flags.writeable
+
+
+def time_of(pid: int) -> float:
+    """Seconds of the processor."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_a_message_that_comes_during_work_ends_no_child() -> None:
+    """The kernel's notice of a message may come when the message has been read. As a signal it ended the child: of
+    30 files that 12 processes read at a time, one "crashed the parser"."""
+    child = Child("service.requests.parser_child", {}, False)
+    large = {**MESH, "vertices": ROWS * 100}
+    body = written({**REQUEST, "scene": {**SCENE, "shapes": [*SCENE["shapes"], large]}})
+    work = parser_pool.Work("request", body, config(), 512 * MIB, 60.0)
+    assert child.rights() is not None
+    before = time_of(child.process.pid)
+    channel.send(child.link, work)
+    while time_of(child.process.pid) < before + 0.1:
+        time.sleep(0.01)
+    channel.send(child.link, work)
+    for _ in range(2):
+        assert child.answers(60) and child.process.poll() is None
+        assert channel.receive(child.link, wait=True, find=parser_pool.allowed).scene.shapes
+    child.kill()
 
 
 @pytest.mark.parametrize(
