@@ -166,6 +166,7 @@ def test_bits_are_those_of_one_renderer(
             np.testing.assert_array_equal(pixels, alone[aov], err_msg=f"{act.__name__} {aov}")
 
 
+@pytest.mark.exact
 @pytest.mark.slow
 def test_a_stream_on_all_renderers_takes_edits(gpu: Renderer) -> None:
     """Blocks of an older generation are thrown away; the picture after an edit is that of one renderer."""
