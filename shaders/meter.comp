@@ -13,8 +13,8 @@ uniform uint block; // pixels a side
 uniform uint rim;   // pixels around it that count, too: where few samples found a thin edge, its neighbours lie on it
 
 void main() {
-    uvec2 b = gl_GlobalInvocationID.xy, blocks = (size + block - 1u) / block;
-    if (b.x >= blocks.x || b.y >= blocks.y) return;
+    uvec2 b = gl_GlobalInvocationID.xy, blocks = (size + block - 1u) / max(block, 1u);
+    if (block == 0u || b.x >= blocks.x || b.y >= blocks.y) return;
     uvec2 low = uvec2(max(ivec2(b * block) - int(rim), ivec2(0))), high = min((b + 1u) * block + rim, size);
     float sum = 0.0;
     uint y = low.y;

@@ -67,7 +67,7 @@ void light_path_connect(Path path, SurfacePoint at, vec3 flux, Medium camera_med
     c *= sides_eta_scale(1.0, side, s, 0.0);
     c *= medium_share(view.medium, link.t);
     float most = max_component(c);
-    counts = counts && most > 0.0 && most < INFINITY_T;
+    counts = counts && most > 0.0 && most < INFINITY_T && !any(isnan(c));
     if (counts && light_path_seen(at, link, camera_medium, rng)) splats_take(link.at, c, odd);
 }
 

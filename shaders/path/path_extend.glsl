@@ -110,9 +110,10 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     }
     path.throughput *= next.scatter.f / (path.alive ? next.scatter.pdf : 1.0);
     float reach = max_component(path.throughput);
-    path.alive = path.alive && reach > 0.0;
-    if (path.alive && !(reach < 1e6)) {
-        atomicAdd(path_ended, 1u); // a throughput that is huge or NaN
+    path.alive = path.alive && (reach > 0.0 || isnan(reach));
+    // Asked for by name: GPUs take the number of max(NaN, 1), and NVIDIA's compiler makes of !(a < b) an a >= b.
+    if (path.alive && (any(isnan(path.throughput)) || reach >= 1e6)) {
+        atomicAdd(path_ended, 1u);
         path.alive = false;
     }
     uint pair = sobol_bounce_pair(path.bounce);

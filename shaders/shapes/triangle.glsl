@@ -23,15 +23,16 @@ Shear triangle_shear(vec3 o, vec3 d) {
 #if HAS_TRIANGLES || HAS_BVH_TRIANGLES || HAS_INSTANCES || HAS_TRIANGLE_LIGHTS
 // The hit in (0, t_max), with the barycentric weights of v1 and v2 in uv, or t_max.
 float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
-    vec3 a = triangle_axes(tri.v0 - s.o, s.axis);
-    vec3 b = triangle_axes(tri.v1 - s.o, s.axis);
-    vec3 c = triangle_axes(tri.v2 - s.o, s.axis);
+    // Precise: where a product and a sum are rounded once, a neighbour's edge is not this one's with another sign.
+    precise vec3 a = triangle_axes(tri.v0 - s.o, s.axis);
+    precise vec3 b = triangle_axes(tri.v1 - s.o, s.axis);
+    precise vec3 c = triangle_axes(tri.v2 - s.o, s.axis);
     a.xy -= s.s.xy * a.z;
     b.xy -= s.s.xy * b.z;
     c.xy -= s.s.xy * c.z;
-    float u = c.x * b.y - c.y * b.x;
-    float v = a.x * c.y - a.y * c.x;
-    float w = b.x * a.y - b.y * a.x;
+    precise float u = c.x * b.y - c.y * b.x;
+    precise float v = a.x * c.y - a.y * c.x;
+    precise float w = b.x * a.y - b.y * a.x;
     float det = u + v + w;
     float t = s.s.z * (u * a.z + v * b.z + w * c.z) / det;
     bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;

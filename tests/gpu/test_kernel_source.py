@@ -99,8 +99,8 @@ def taken(source: KernelSource) -> str:
             _, before = branches.pop()
             branches.append((not before and (directive == "#else" or _holds(rest, defines)), before))
             branches[-1] = branches[-1][0], before or branches[-1][0]
-        elif directive == "#if":
-            holds = _holds(rest, defines)
+        elif directive in ("#if", "#ifdef"):
+            holds = rest in defines if directive == "#ifdef" else _holds(rest, defines)
             branches.append((holds, holds))
         elif all(holds for holds, _ in branches):
             if directive == "#define":
