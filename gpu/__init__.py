@@ -35,6 +35,7 @@ from gpu.errors import (
     WrongThread,
 )
 from gpu.footprint import picture_bytes, scene_bytes
+from gpu.kernels.binaries import cache_folder
 from gpu.kernels.features import LIGHT_PERIOD
 from gpu.layout.pixel_layers import ACCUMULATOR_BYTES
 from gpu.picture.blocks import Band, border_after, stop_after
@@ -85,6 +86,7 @@ __all__ = [
     "ViewTable",
     "WrongThread",
     "border_after",
+    "cache_folder",
     "can_move",
     "devices",
     "picture_bytes",

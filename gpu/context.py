@@ -18,7 +18,7 @@ _thread = threading.local()
 REQUIRED = 430  # compute shaders and storage buffers
 PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
 DEDICATED_VIDEO_MEMORY = 0x9047  # GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render driver")
 EXTENSIONS, DRM_FILE = 0x3055, 0x3233  # EGL_EXTENSIONS and EGL_DRM_DEVICE_FILE_EXT, which EGL tells of a device
 
 
@@ -113,6 +113,23 @@ def allocate(context: Any, contents: np.ndarray | int) -> Any:
     return buffer
 
 
+def dispatch(context: Any, kernel: Any, *groups: int, beside: bool = False) -> None:
+    """Start a kernel, the one way to do so; the caller waits for it. Whatever later commands do, they see what the
+    kernel wrote: by OpenGL 4.3, 7.12.2, nothing else makes them, glFinish neither.
+
+    With `beside` the next dispatch may run at the same time: it touches nothing that this one writes.
+    """
+    kernel.run(*groups)
+    if not beside:
+        context.memory_barrier()
+
+
+def is_software(context: Any) -> bool:
+    """Whether the context's device is the processor."""
+    renderer = str(context.info["GL_RENDERER"]).lower()
+    return any(name in renderer for name in _SOFTWARE)
+
+
 def storage_block_bytes(context: Any) -> int:
     """The most bytes of a buffer that a kernel may be given at once."""
     return int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
@@ -123,7 +140,7 @@ def describe(context: Any) -> dict[str, Any]:
     bytes, None where the driver does not say."""
     info = context.info
     renderer = str(info["GL_RENDERER"])
-    software = any(s in renderer.lower() for s in _SOFTWARE)
+    software = is_software(context)
     return {
         "renderer": renderer,
         "version": str(info["GL_VERSION"]),

@@ -261,7 +261,7 @@ class _Dispatch:
             texture.use(unit)
         for name, value in {**self._uniforms, **uniforms, "first": first, "count": count}.items():
             self._kernel[name].value = value
-        self._kernel.run(-(-count // BSDF_GROUP))
+        contexts.dispatch(self._context, self._kernel, -(-count // BSDF_GROUP))
         self._context.finish()
 
     def release(self) -> None:

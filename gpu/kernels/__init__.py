@@ -16,5 +16,6 @@ measured_glsl  records and tables of the model `measured` as GLSL
 microfacets_glsl  parameters and tables of the model `microfacet` as GLSL
 models_glsl     the functions that pick those of a material's model, as GLSL
 source          shader text with its includes and flags; errors by file and line
+binaries        machine code on disk, where the driver is a GPU's
 cache           compiled kernels, with a bound on how many are in memory
 """

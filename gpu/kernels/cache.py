@@ -18,6 +18,7 @@ from typing import Any
 
 from gpu import context as contexts
 from gpu.errors import CompileError
+from gpu.kernels.binaries import ProgramBinaries
 from gpu.kernels.source import SHADERS, KernelSource
 
 log = logging.getLogger(__name__)
@@ -44,6 +45,7 @@ class KernelCache:
     ) -> None:
         self._context = context
         self._folders = folders
+        self._binaries = ProgramBinaries(context)
         self._most, self._longest_s = most, longest_s
         self._cache: dict[_Key, _Kept] = {}
         self.last_compile_ms = 0.0
@@ -103,14 +105,18 @@ class KernelCache:
     def _compile(self, entry: str, defines: Mapping[str, object]) -> Any:
         source = KernelSource(entry, defines, self._folders)
         start = time.perf_counter()
-        try:
-            kernel = self._context.compute_shader(source.text)
-        except Exception as error:  # moderngl.Error is not importable without its binary parts
-            raise CompileError(f"{entry}: {source.explain(str(error))}") from error
+        kernel: Any = self._binaries.load(entry, source.text)
+        what = "compiled" if kernel is None else "loaded"
+        if kernel is None:
+            try:
+                kernel = self._context.compute_shader(source.text)
+            except Exception as error:  # moderngl.Error is not importable without its binary parts
+                raise CompileError(f"{entry}: {source.explain(str(error))}") from error
+            self._binaries.store(entry, source.text, kernel)
         self.last_compile_ms = (time.perf_counter() - start) * 1e3
         on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
         key, flags = sha256(source.text.encode()).hexdigest()[:12], "+".join(on) or "none"
-        log.info(f"compiled {entry}", {"key": key, "flags": flags, "ms": round(self.last_compile_ms)})
+        log.info(f"{what} {entry}", {"key": key, "flags": flags, "ms": round(self.last_compile_ms)})
         return kernel
 
     def release(self) -> None:

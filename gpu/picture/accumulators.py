@@ -106,7 +106,7 @@ class Accumulators:
         self._dispatcher.bind_part(_beside(self.block), part, 0)
         kernel["first"].value, kernel["count"].value = first - begins, count
         kernel["moment_scale"].value = self.moment_scale
-        kernel.run(*work_groups(_LINE, -(-count // _LINE)))
+        contexts.dispatch(self._context, kernel, *work_groups(_LINE, -(-count // _LINE)))
         self._context.finish()
 
     def end_block(self) -> None:

@@ -95,7 +95,7 @@ class Adaptive:
             moments.bind_to_storage_buffer(int(Slot.MOMENTS), offset=16 * width * first, size=16 * width * rows)
             output.bind_to_storage_buffer(int(Slot.OUTPUT))
             kernel["size"].value = (width, rows)
-            kernel.run(*work_groups(columns, lines))
+            contexts.dispatch(self._context, kernel, *work_groups(columns, lines))
             parts.append(np.frombuffer(output.read(), np.float32).reshape(lines, columns, 2, CLASSES))
             output.release()
         seen = np.concatenate(parts)

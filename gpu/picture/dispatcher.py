@@ -29,7 +29,8 @@ class Dispatcher:
         # As drivers bind no more than 128 MiB at once, to be sure of.
         self.most_pixels = contexts.storage_block_bytes(context) // VECTOR_BYTES // _ALIGNED * _ALIGNED - _ALIGNED
         self.counters = context.buffer(reserve=16)  # paths ended by their throughput, samples cut short
-        self._spreads = bool(contexts.describe(context)["software"])
+        self.is_software = contexts.is_software(context)
+        self._uniforms_beside = context.buffer(reserve=Uniforms.dtype.itemsize)
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
 
     def configure(self, settings: RenderSettings) -> None:
@@ -78,11 +79,21 @@ class Dispatcher:
         uniforms["slot_width"] = s.width
         return uniforms
 
-    def run(self, kernel: Any, uniforms: np.ndarray, groups: tuple[int, int]) -> None:
-        """Start a kernel; the caller waits for it."""
-        uniforms["group_stride"] = group_stride(groups[0] * groups[1]) if self._spreads else 1
+    def run(self, kernel: Any, uniforms: np.ndarray, groups: tuple[int, int], beside: bool = False) -> None:
+        """Start a kernel; the caller waits for it. With `beside` the next one, `run_beside`, may run at the same
+        time."""
+        uniforms["group_stride"] = group_stride(groups[0] * groups[1]) if self.is_software else 1
         self._uniform_buffer.write(uniforms.tobytes())
-        kernel.run(*groups)
+        contexts.dispatch(self.context, kernel, *groups, beside=beside)
+
+    def run_beside(self, kernel: Any, uniforms: np.ndarray, groups: tuple[int, int]) -> None:
+        """Start a kernel beside the one before. Its uniforms are in a buffer of their own, as those of the other may
+        still be read."""
+        self._uniforms_beside.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
+        uniforms["group_stride"] = 1
+        self._uniforms_beside.write(uniforms.tobytes())
+        contexts.dispatch(self.context, kernel, *groups)
+        self._uniform_buffer.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -108,4 +119,5 @@ class Dispatcher:
 
     def release(self) -> None:
         self._filter.release()
+        self._uniforms_beside.release()
         self.counters.release()

@@ -85,7 +85,7 @@ class NoiseMeter:
             moments.bind_to_storage_buffer(int(Slot.MOMENTS), offset=16 * width * first, size=16 * width * rows)
             output.bind_to_storage_buffer(int(Slot.OUTPUT))
             kernel["size"].value, kernel["block"].value, kernel["rim"].value = (width, rows), side, int(side > 1)
-            kernel.run(*work_groups(columns, lines))
+            contexts.dispatch(self._context, kernel, *work_groups(columns, lines))
             parts.append(np.frombuffer(output.read(), np.float32).reshape(lines, columns))
             output.release()
         weights = np.concatenate(parts)
@@ -121,7 +121,7 @@ class NoiseMeter:
             count = min(self._most, width * height - first)
             sums.bind(kernel, first, count)
             kernel["first"].value, kernel["count"].value = first, count
-            kernel.run(*work_groups(LINE, self.lines))
+            contexts.dispatch(self._context, kernel, *work_groups(LINE, self.lines))
             results = np.frombuffer(output.read(), np.float32).reshape(-1, 4).astype(float)
             totals += results[:, :2].sum(axis=0)
             seen += results[:, 2]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
@@ -21,7 +20,7 @@ from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.light_paths import LightPaths, samples_with_paths
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
-from gpu.picture.tiles import MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
+from gpu.picture.tiles import GPU_FLOOR, MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
 
 _MERGED = 1 << 18  # pixels that a slice merges, in some milliseconds of llvmpipe
 
@@ -145,8 +144,9 @@ class Passes:
     def _cut(self) -> None:
         """Make the schedules for this kernel and these settings."""
         d, s = self._dispatcher, self._dispatcher.settings
-        samples = MAX_SAMPLES_A_PASS
-        if contexts.describe(d.context)["software"]:
+        samples, floor = MAX_SAMPLES_A_PASS, GPU_FLOOR
+        if d.is_software:
+            floor = 0
             counts = features.counts(d.scene.arrays)
             standing = sum(int(str(counts[name])) for name in features.COUNTS)
             samples = samples_at_once(s.max_bounces, standing, len(d.scene.arrays.nodes) // 8)
@@ -159,11 +159,11 @@ class Passes:
         if s.adaptive:
             self._schedule = Adaptive(d.context, self._kernels, size, d.most_pixels, s.max_bounces)
         else:
-            self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples)
+            self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples, floor)
         if rates is not None:
             self._schedule.expect(rates)  # of another kernel: the best estimate
-        self._light_tiles = Tiles(*size, d.most_pixels, s.max_bounces, samples)
-        self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
+        self._light_tiles = Tiles(*size, d.most_pixels, s.max_bounces, samples, floor)
+        self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples, floor)
 
     def _compile_fully(self) -> None:
         """Run the kernel over no pixel: drivers make machine code in the first run, which must not be timed."""
@@ -213,7 +213,7 @@ class Passes:
         if self._row == height and self._column == 0 and self.samples < noise_meter.FROM <= after:
             self._meter.place(self._sums.total, self._dispatcher.settings.seed)
             self._dispatcher.bind()
-        merges = self._sums.open and after == blocks.border_after(self.samples)
+        merges = self._merges
         if self._row >= metered + (self._dispatcher.settings.height if merges else 0):
             if merges:
                 self._sums.end_block()
@@ -250,31 +250,62 @@ class Passes:
     def _trace_picture(self) -> None:
         schedule = self.schedule
         tile = schedule.tile(self._row, self._column, schedule.chunk)
+        is_last = tile[0] + tile[2] == schedule.size[0] and tile[1] + tile[3] == schedule.size[1]
+        beside = is_last and self._meters_beside
         start = time.perf_counter()
-        self._trace(self._sums.block if self._sums.open else self._sums.total, *schedule.dispatch(tile))
+        sums = self._sums.block if self._sums.open else self._sums.total
+        self._trace(sums, *schedule.dispatch(tile), beside=beside)
+        merges = beside and self._merges
+        if beside:
+            self._start_meter((0, 0, noise_meter.LINE, self._meter.lines), 0, beside=True)
+        if merges:  # one wait for both
+            self._sums.merge(0, schedule.size[0] * schedule.size[1])
+            self._dispatcher.bind()
         self._took(schedule, tile, schedule.chunk, start)
+        if beside:
+            self._row += self._meter.lines
+        if merges:
+            self._row += schedule.size[1]
+
+    @property
+    def _merges(self) -> bool:
+        """Whether the pass under way ends a block."""
+        return self._sums.open and self.samples + self._pass_samples == blocks.border_after(self.samples)
+
+    @property
+    def _meters_beside(self) -> bool:
+        """Whether the noise meter's pixels, too few to fill a GPU, are traced beside the picture's last tile."""
+        d = self._dispatcher
+        ready = self.samples >= noise_meter.FROM and not self._light.on and not d.is_software
+        fits = d.settings.width * d.settings.height <= d.most_pixels
+        return ready and fits and self._parted and self.schedule.meter_rounds(noise_meter.FROM) == 1
 
     def _trace(
         self, sums: dict[Slot, Any], part: Tile, origin: tuple[int, int], size: tuple[int, int], first: int,
-        samples: int, groups: tuple[int, int],
+        samples: int, groups: tuple[int, int], beside: bool = False,
     ) -> None:  # fmt: skip
         d = self._dispatcher
         uniforms = d.uniforms(origin, size, first, samples)
         uniforms["slot_first"] = d.bind_part(sums, part, d.settings.width)
-        d.run(self._kernel, uniforms, groups)
+        d.run(self._kernel, uniforms, groups, beside)
 
     def _trace_meter(self, row: int) -> None:
-        d, schedule = self._dispatcher, self.schedule
         turn, row = divmod(row, self._meter.lines)
-        first, samples = schedule.meter_samples(noise_meter.FROM, turn)
+        _, samples = self.schedule.meter_samples(noise_meter.FROM, turn)
         tile = self._meter_tiles.tile(row, self._column, samples)
         start = time.perf_counter()
+        self._start_meter(tile, turn)
+        self._took(self._meter_tiles, tile, samples, start)
+
+    def _start_meter(self, tile: Tile, turn: int, beside: bool = False) -> None:
+        d, schedule = self._dispatcher, self.schedule
+        first, samples = schedule.meter_samples(noise_meter.FROM, turn)
         schedule.bind()
         uniforms = d.uniforms(tile[:2], tile[2:], first, samples)
         uniforms["replicate"], uniforms["moment_scale"], uniforms["slot_width"] = 1, 0, noise_meter.LINE
         uniforms["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
-        d.run(self._kernel, uniforms, work_groups(tile[2], tile[3]))
-        self._took(self._meter_tiles, tile, samples, start)
+        run = d.run_beside if beside else d.run
+        run(self._kernel, uniforms, work_groups(tile[2], tile[3]))
 
     def _took(self, tiles: Schedule, tile: Tile, samples: int, start: float) -> None:
         """Wait for the tile that began at `start`, and advance to the next one."""
@@ -288,7 +319,9 @@ class Passes:
             self._column, self._row = 0, self._row + tile[3]
 
     def _merge(self, row: int) -> None:
-        settings, most = self._dispatcher.settings, min(_MERGED, self._dispatcher.most_pixels)
+        settings, most = self._dispatcher.settings, self._dispatcher.most_pixels
+        if self._dispatcher.is_software:
+            most = min(_MERGED, most)
         width = min(settings.width - self._column, most)
         rows = min(max(1, most // settings.width), settings.height - row) if self._column == 0 else 1
         tile = self._column, row, width, rows

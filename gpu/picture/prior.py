@@ -101,7 +101,7 @@ class Prior:
         kernel["worth"].value = worth
         for slot, buffer in {Slot.BEFORE: old, **buffers, **self.guess}.items():
             buffer.bind_to_storage_buffer(int(slot))
-        kernel.run(*work_groups(*self.size))
+        contexts.dispatch(self.context, kernel, *work_groups(*self.size))
         for buffer in buffers.values():
             buffer.release()
 
@@ -123,7 +123,7 @@ class Prior:
                 (Slot.OUTPUT, self._warped),
             ):
                 buffer.bind_to_storage_buffer(int(slot))
-            kernel.run(*work_groups(*self.size))
+            contexts.dispatch(self.context, kernel, *work_groups(*self.size))
             self._seen_by = camera.tobytes()
             self._seen = np.frombuffer(self._warped.read(), np.float32).reshape(self.size[1], self.size[0], 4)
         return self._warped, self._seen

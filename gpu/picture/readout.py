@@ -40,9 +40,10 @@ class Readout:
         self.coverage = Coverage(dispatcher.context, self._size, dispatcher.most_pixels)
 
     def _pieces(self) -> Iterator[tuple[int, int]]:
-        """The first pixel and the number of pixels of pieces that fit into a processor's cache."""
+        """The first pixel and the number of pixels of pieces that fit into a processor's cache; of a GPU's, one."""
         pixels = self._size[0] * self._size[1]
-        return ((first, min(_PIECE, pixels - first)) for first in range(0, pixels, _PIECE))
+        piece = _PIECE if self._dispatcher.is_software else pixels
+        return ((first, min(piece, pixels - first)) for first in range(0, pixels, piece))
 
     def color(self) -> np.ndarray:
         """Mean radiance and alpha: (height, width, 4) float32."""
@@ -83,9 +84,13 @@ class Readout:
         d = self._dispatcher
         own: dict[Slot, Any] = {}
         bind = self._sums.bind
-        if samples and color is None and (self._light.on or prior is not None):
+        together = color is None and prior is not None and samples > 0 and not self._light.on and not self._sums.open
+        if samples and color is None and (self._light.on or prior is not None) and not together:
             color = self.color()
-        if color is not None:
+        if together:
+            assert prior is not None
+            bind = partial(self._sums.bind_alone, self._sums.total, prior.guess)
+        elif color is not None:
             weight = 1 if prior is None else samples
             given = {Slot.SUM: color * np.float32(weight), Slot.MOMENTS: np.full_like(color, weight)}
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}

@@ -50,7 +50,7 @@ def resolve(
         bind(kernel, first, count)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         kernel["count"].value = count
-        kernel.run(*work_groups(_LINE, -(-count // _LINE)))
+        contexts.dispatch(context, kernel, *work_groups(_LINE, -(-count // _LINE)))
         parts.append(output.read())
         output.release()
     if taken:

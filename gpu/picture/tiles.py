@@ -28,6 +28,10 @@ MAX_SAMPLES_A_PASS = 256
 METER_ROUND = 8  # most samples of an invocation for the noise meter, whose few pixels then fill a slice
 LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
+# Pixels of a GPU's smallest tile, and the slices that its largest one may take: a dispatch has a floor, the time of
+# its longest paths, that no smaller tile lowers. An H200 is full with 16 to 64 Ki pixels.
+GPU_FLOOR = 1 << 14
+GPU_MOST = 1.5
 _LEAST = WORK_GROUP  # columns of a tile
 _LONG_BAND, _LONG_LEAST = 4, 16  # rows and columns where paths may be so long that 128 pixels take 0.1 s
 GUESS_S = 2e-7  # seconds of a sample of a pixel, before any is measured
@@ -39,13 +43,16 @@ class Tiles:
     """Tiles of `width` x `height` pixels in order. No more than `most` pixels lie between a tile's first and last."""
 
     def __init__(
-        self, width: int, height: int, most: int, max_bounces: int = 0, most_samples: int = MAX_SAMPLES_A_PASS
-    ) -> None:
+        self, width: int, height: int, most: int, max_bounces: int = 0, most_samples: int = MAX_SAMPLES_A_PASS,
+        floor: int = 0,
+    ) -> None:  # fmt: skip
+        """A tile of fewer than `floor` pixels takes no less time than one of so many."""
         self.size, self.max_bounces = (width, height), max_bounces
-        self._most_samples = most_samples
+        self._most_samples, self._floor = most_samples, floor
         self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
         band, self._least = (BAND, _LEAST) if self._caution < 4 else (_LONG_BAND, _LONG_LEAST)
         self._band = band if band * width <= most else max(1, most // width)
+        self._most = most
         self._most_rows = max(self._band, most // width // self._band * self._band)
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
         self.rates = np.zeros(-(-height // self._band))  # by band
@@ -63,6 +70,8 @@ class Tiles:
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
+        if self._floor and column == 0 and self._band * self.size[0] <= self._most:
+            return self._large_tile(row, samples)
         width, height = self.size
         first = row // self._band
         guess = (self.cost_s or GUESS_S * self._caution) * self._caution
@@ -78,6 +87,17 @@ class Tiles:
             return 0, row, width, min(rows, height - row)
         columns = max(int(min(pixels / self._band, width)) // _LEAST * _LEAST, self._least)
         return column, row, min(columns, self._most_columns, width - column), rows
+
+    def _large_tile(self, row: int, samples: int) -> Tile:
+        """Of the rows from there on: all of them where they fit into a slice, else an equal share of their cost."""
+        width, height = self.size
+        bands = self.rates[row // self._band :]
+        costs = np.where(bands > 0, bands, self.cost_s or GUESS_S * self._caution) * (self._band * width * samples)
+        parts = max(1, int(np.ceil(costs.sum() * (self._caution if self.cost_s == 0 else 1) / (GPU_MOST * SLICE_S))))
+        count = int(np.searchsorted(np.cumsum(costs), costs.sum() / parts * (1 - 1e-6))) + 1
+        least = -(-self._floor // (self._band * width))
+        rows = min(max(count, least) * self._band, self._most_rows)
+        return 0, row, width, min(rows, height - row)
 
     def pixels_before(self, row: int, column: int) -> int:
         """The pixels of all tiles before the one that begins there."""
@@ -98,6 +118,9 @@ class Tiles:
         """The samples of every pixel to take in the pass after `samples`, so that the smallest tile fits a slice."""
         if samples == 0 or self.cost_s == 0:
             return 1
+        if self._floor:  # as many as a slice has time for in all pixels at once: few samples of many pixels
+            fits = int(GPU_MOST * SLICE_S / (self.cost_s * self.size[0] * self.size[1]))
+            return max(1, min(samples, fits, self._most_samples))
         fits = int(SLICE_S / (self.rates.max() * self._least * self._band))
         return max(1, min(fits, usual_pass(self.size, self.cost_s, samples, sharers), self._most_samples))
 
@@ -130,7 +153,7 @@ class Tiles:
 
     @property
     def _meter_round(self) -> int:
-        return min(METER_ROUND, self._most_samples)
+        return max(1, self.chunk) if self._floor else min(METER_ROUND, self._most_samples)
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
         return row, column

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
 from gpu.bsdf import kernels as bsdf
 from gpu.device.textures import KINDS, bound_textures, rows
 from gpu.kernels import features
+from gpu.kernels.binaries import ENTRIES, binary_file
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
 from gpu.picture import accumulators, light_paths, noise_meter, resolve
@@ -38,6 +40,15 @@ class KernelKey:
     @property
     def text(self) -> str:
         return KernelSource(self.entry, dict(self.defines)).text
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether its code goes into our own cache, where the device is a GPU."""
+        return self.entry in ENTRIES
+
+    def is_kept(self, info: Mapping[str, Any]) -> bool:
+        """Whether its code is in there, for the driver that `info` (`Renderer.info`) names."""
+        return self.is_ours and binary_file(info, self.text).exists()
 
     def digest(self, driver: str) -> str:
         return sha256(repr((driver, self.text, self.textures)).encode()).hexdigest()[:32]

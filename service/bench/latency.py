@@ -103,6 +103,7 @@ class Editor:
     ) -> None:
         self._port, self._stream, self._size = port, stream, size
         self._generation = 0
+        self.scale = 0.0  # of the last frame: 1 is full size
         self._load(scene)
 
     def _load(self, scene: str) -> None:
@@ -170,6 +171,7 @@ class Editor:
             return None
         header = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
         self._stream.send(json.dumps({"type": "ack", "seq": header["seq"]}))
+        self.scale = float(header["scale"])
         return int(header["generation"])
 
 

@@ -43,7 +43,8 @@ from service.worker.task import Task
 Turns = Task | Assistant | BsdfTask  # what has turns
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
-COMPILING_S = 60.0  # no hang: some drivers take this long for a kernel with every feature
+# No hang: some drivers take this long for a kernel with every feature. Those of GPUs take most.
+COMPILING_S = {True: 60.0, False: 300.0}  # by whether the device is the processor
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +75,7 @@ class Loop:
         )
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
+        self._compiling_s = COMPILING_S[renderer.info["software"]]
         self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline, foresees)
         self._context = WorkerContext(
             renderer,
@@ -139,7 +141,7 @@ class Loop:
     def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
         """Do the work and charge the task's client for its time. An exception fails this task only."""
         began = time.perf_counter()
-        with self._heartbeat.working(task.number, COMPILING_S if task.loads else 0.0):
+        with self._heartbeat.working(task.number, self._compiling_s if task.loads else 0.0):
             self._guard(task, work, read)
         seconds = time.perf_counter() - began
         self._scheduler.charge(task, seconds)

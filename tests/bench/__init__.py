@@ -17,6 +17,8 @@ peer_sunbox     Sunbox's side
 peer_mitsuba    Mitsuba's side
 peer_cycles     Cycles' side
 peer_blender    the scenes for Cycles
+device          what is to be learned of a GPU in ten minutes
+standin         how work is cut for a stand-in for a GPU, in simulated time
 profile         where the time of a path goes on llvmpipe
 soak            mixed clients for a long time
 soak_clients    the clients of `soak`

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -46,6 +47,18 @@ def parser() -> argparse.ArgumentParser:
     text = "also look with all tests of `make test` for what those near do not find: hours"
     command.add_argument("--whole", action="store_true", help=text)
 
+    text = "what is to be learned of a GPU in ten minutes, part by part, into a folder"
+    command = add("device", _device, text, False)
+    command.add_argument("-o", "--output", metavar="FOLDER", required=True, help="for report.jsonl and its page")
+    command.add_argument("--limit", type=_count, default=590, metavar="S", help="seconds in all (default: 590)")
+    command.add_argument("--device", type=int, metavar="N", help="EGL's device N instead of the default")
+    text = "this part instead of all; may be given again"
+    command.add_argument("--part", action="append", default=[], metavar="NAME", help=text)
+    text = "sizes and samples of this share, where a processor plays the device (default: 1)"
+    command.add_argument("--scale", type=float, default=1.0, metavar="X", help=text)
+    text = "render the pictures that others are compared with anew, by this device, and nothing else"
+    command.add_argument("--reference", action="store_true", help=text)
+
     text = "the first frame after every slider's move and every change of scene, caches empty, in half an hour"
     command = add("frames", _frames, text)
     command.add_argument("--scenes", metavar="NAMES", help="only these built-in scenes, separated by commas")
@@ -78,6 +91,8 @@ def parser() -> argparse.ArgumentParser:
         add("restarts", soak_restarts.run, "a thousand renders while the whole server is restarted", False)
     )
     gallery.add_options(add("gallery", gallery.run, "render the README's pictures again", False))
+    command = add("standin", _standin, "how work is cut for a stand-in for a GPU, in simulated time", False)
+    command.add_argument("--json", action="store_true", help="print JSON instead of a table")
     command = add("verdict", _verdict, "false alarms of a verdict over pairs that differ by noise alone")
     command.add_argument("--pairs", type=_count, default=1000, metavar="N", help="of each kind (default: 1000)")
     add("thumbnails", _thumbnails, "render the editor's pictures of the material presets again", False)
@@ -132,6 +147,28 @@ def _frames(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _device(arguments: argparse.Namespace) -> int:
+    from tests.bench.device import pictures, report, run
+    from tests.bench.device.part import Options
+
+    for name in arguments.part:
+        if name not in run.PARTS:
+            raise BadInput(f"--part {name!r}: is not one of {', '.join(run.PARTS)}")
+    if arguments.reference:
+        pictures.write_reference(run.REFERENCE)
+        return 0
+    folder = Path(arguments.output)
+    options = Options(arguments.device, 0.0, str(run.REFERENCE), str(folder), arguments.scale)
+    try:
+        run.measure(folder, arguments.limit, options, arguments.part, progress)
+    except OSError as error:
+        raise BadInput(f"--output {arguments.output!r}: {error.strerror or error}") from None
+    page = report.page(folder / "report.jsonl")
+    (folder / "report.md").write_text(page)
+    print(page)
+    return 0
+
+
 def _drag(arguments: argparse.Namespace) -> int:
     output = output_path(arguments.output)
     from tests.bench import under_hand
@@ -174,6 +211,14 @@ def _hemisphere(arguments: argparse.Namespace) -> int:
     write_figures(output, document)
     if figure:
         hemisphere.figure(document, figure)
+    return 0
+
+
+def _standin(arguments: argparse.Namespace) -> int:
+    from tests.bench import standin
+
+    document = standin.measure()
+    print(json.dumps(document) if arguments.json else standin.table(document))
     return 0
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -14,8 +16,10 @@ from gpu.precompile.precompiler import Precompiler
 class Timed(Precompiler):
     """Takes these seconds for the kernel that is asked for, and for any other."""
 
+    _binaries: Any
+
     def __init__(self, asked_s: list[float], other_s: list[float]) -> None:
-        self._has_cache = None
+        self._has_cache, self._binaries = None, SimpleNamespace(able=False)
         self._seconds = {True: iter(asked_s), False: iter(other_s)}
         self._last = {True: asked_s[-1], False: other_s[-1]}
 

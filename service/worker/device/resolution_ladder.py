@@ -18,6 +18,7 @@ FIRST_S = 0.030
 FULL_S = 0.040  # ... or this when it is the full picture: no second look follows that would cost more
 NEXT_S = 0.120  # how long a first look may stand before something sharper replaces it
 UNMEASURED_S = 2e-6  # a sample of a pixel, before there was one; a large mesh takes 1e-6 on llvmpipe with 2 cores
+UNMEASURED_GPU_S = 1.5e-8  # an H200 takes 1e-9 to 3e-8
 
 
 class ResolutionLadder:
@@ -29,6 +30,7 @@ class ResolutionLadder:
         self._scene = scene
         self._settings = settings
         self._pictures = {1.0: renderer.picture(scene, settings)} if full else {}
+        self._unmeasured_s = UNMEASURED_S if renderer.info["software"] else UNMEASURED_GPU_S
 
     @property
     def full(self) -> Picture:
@@ -62,7 +64,7 @@ class ResolutionLadder:
 
     def first(self, pixel_s: float | None) -> float:
         """The scale to begin with, where a sample of a pixel takes `pixel_s` seconds."""
-        pixel_s = pixel_s or UNMEASURED_S
+        pixel_s = pixel_s or self._unmeasured_s
         if self.pixels(1.0) * pixel_s <= FULL_S:
             return 1.0
         smaller = [s for s in SCALES[1:] if min(self._settings.width, self._settings.height) * s >= SMALLEST_SIDE]
@@ -72,7 +74,7 @@ class ResolutionLadder:
     def next(self, scale: float, pixel_s: float | None) -> float:
         """The scale that comes after: the sharpest that is there soon, and at least twice as sharp."""
         larger = [s for s in SCALES if s > scale]
-        fitting = [s for s in larger if self.pixels(s) * (pixel_s or UNMEASURED_S) <= NEXT_S]
+        fitting = [s for s in larger if self.pixels(s) * (pixel_s or self._unmeasured_s) <= NEXT_S]
         return (fitting or larger[-1:])[0]
 
     def reset(self) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from gpu import cache_folder
 from service.ipc import channel
 from service.ipc.messages import driver_of
 from service.system.cpu_time import RunnableTime
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 TRIES = 3  # failures in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
+GPU_LIMIT_S = 300.0  # ... on a GPU: NVIDIA's compiler takes 20 s for most kernels, and a minute for some
 SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
 # What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then, or
 # it was there for one picture alone.
@@ -123,16 +125,18 @@ class CompileClient:
         self.foresees = foresees
         self._driver = driver_of(info)
         self._crowded = crowded
-        self._able = _has_cache()
+        self._keeps = None if info["software"] else info  # where kernels are kept by us, and no record is needed
+        self._able = self._keeps is not None or _has_cache()
         self._records = records()
         self._known: set[KernelKey] = set()  # kernels that are compiled, or that no helper could compile
         self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
         self._lanes = dict[Priority, _Lane]()
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
+        limit_s = LIMIT_S if info["software"] else GPU_LIMIT_S
         for each in get_args(Priority):
             line = lifeline if each == "now" else None
             helper = HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line)
-            self._lanes[each] = _Lane(helper, LIMIT_S if each == "now" else SPARE_LIMIT_S)
+            self._lanes[each] = _Lane(helper, limit_s if each == "now" else SPARE_LIMIT_S)
         self._lanes["spare"].begins = time.monotonic() + SPARE_AFTER_S
 
     @property
@@ -223,6 +227,8 @@ class CompileClient:
         return key in self._known
 
     def _is_recorded(self, key: KernelKey) -> bool:
+        if self._keeps is not None and key.is_ours:
+            return key.is_kept(self._keeps)
         return self._able and os.path.exists(self._records / key.digest(self._driver))
 
     def _record(self, key: KernelKey) -> None:
@@ -310,5 +316,4 @@ def _prune(records: Path) -> None:
 
 def records() -> Path:
     """The folder beside the driver's cache in which an empty file says that a kernel is in there."""
-    base = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "sunbox" / "kernels"
+    return cache_folder() / "kernels"

@@ -127,14 +127,18 @@ def test_late(now_s: float, sample_s: float, even: bool, expected: bool) -> None
 class Pictures:
     """As much of a renderer as a ladder needs before it is climbed."""
 
+    def __init__(self, software: bool = True) -> None:
+        self.info = {"software": software}
+
     def picture(self, scene: Any, settings: RenderSettings) -> RenderSettings:
         return settings
 
 
 @pytest.mark.parametrize("side", [1, 40, 512, 4096])
 @pytest.mark.parametrize("pixel_s", [None, 1e-9, 1.2e-7, 1e-6, 1e-3])
-def test_ladder(side: int, pixel_s: float | None) -> None:
-    renderer: Any = Pictures()
+@pytest.mark.parametrize("software", [True, False])
+def test_ladder(side: int, pixel_s: float | None, software: bool) -> None:
+    renderer: Any = Pictures(software)
     ladder = ResolutionLadder(renderer, renderer, RenderSettings(side, side))
     scale = ladder.first(pixel_s)
     assert scale == 1.0 or side * scale >= 16
@@ -146,6 +150,14 @@ def test_ladder(side: int, pixel_s: float | None) -> None:
     assert all(higher >= 2 * lower for lower, higher in pairwise(climbed))
     if pixel_s and side * side * pixel_s <= NEXT_S:
         assert len(climbed) <= 2
+
+
+def test_a_gpu_shows_the_whole_picture_at_once() -> None:
+    """Before anything was measured, 1920 x 1080 begins at full size, where a processor begins with a part."""
+    scene: Any = None
+    renderers: list[Any] = [Pictures(True), Pictures(False)]
+    ladders = [ResolutionLadder(renderer, scene, RenderSettings(1920, 1080)) for renderer in renderers]
+    assert [ladder.first(None) for ladder in ladders] == [1 / 16, 1.0]
 
 
 class Costly:
@@ -160,7 +172,7 @@ class Costly:
 
 
 def test_each_rung_is_expected_to_cost_what_the_sharpest_so_far_did() -> None:
-    renderer: Any = SimpleNamespace(picture=lambda scene, settings: Costly())
+    renderer: Any = SimpleNamespace(picture=lambda scene, settings: Costly(), info={"software": True})
     ladder = ResolutionLadder(renderer, renderer, RenderSettings(512, 512))
     first: Any = ladder.picture(1 / 8)
     second: Any = ladder.picture(1 / 4)
