@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from gpu.errors import ContextError, OutOfMemory
+from gpu.errors import ContextError, OutOfMemory, SceneTooLarge
 
 log = logging.getLogger(__name__)
 _thread = threading.local()
 
 REQUIRED = 430  # compute shaders and storage buffers
+STORAGE_BLOCKS = 16  # of the largest kernel; OpenGL 4.3 promises 8, and drivers of desktops' GPUs have 16 or more
 PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
 DEDICATED_VIDEO_MEMORY = 0x9047  # GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render driver")
@@ -78,9 +79,14 @@ def create(device: int | None = None) -> Any:
         where = "the default EGL device" if device is None else f"EGL device {device}"
         raise ContextError(
             f"no OpenGL {REQUIRED / 100:.1f} context on {where} ({error}): needs a GPU driver with EGL, "
-            f"or Mesa's software renderer (on Debian `apt-get install {PACKAGES}`)"
+            f"or Mesa's software renderer (on Debian `apt-get install {PACKAGES}`). An NVIDIA GPU that is divided by "
+            "MIG has no OpenGL, and a container needs NVIDIA_DRIVER_CAPABILITIES=graphics,utility,compute"
         ) from error
     _thread.current = context
+    if (blocks := int(context.info["GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS"])) < STORAGE_BLOCKS:
+        renderer = context.info["GL_RENDERER"]
+        release(context)
+        raise ContextError(f"{renderer} gives a kernel {blocks} storage buffers; Sunbox needs {STORAGE_BLOCKS}")
     log.info("created context", {"driver": context.info["GL_RENDERER"], "version": context.info["GL_VERSION"]})
     return context
 
@@ -111,6 +117,38 @@ def allocate(context: Any, contents: np.ndarray | int) -> Any:
         buffer.release()
         raise OutOfMemory(f"the device has no {size / 2**20:.0f} MiB left")
     return buffer
+
+
+def block(context: Any, contents: np.ndarray | int) -> Any:
+    """A buffer of which a kernel is given all at once. Raises SceneTooLarge, OutOfMemory.
+
+    llvmpipe promises 128 MiB and gives what there is.
+    """
+    size = contents if isinstance(contents, int) else contents.nbytes
+    most = storage_block_bytes(context)
+    if size > most and not is_software(context):
+        raise SceneTooLarge(
+            f"{size / 2**20:.0f} MiB of one kind of record: this driver gives a kernel {most / 2**20:.0f} MiB at once"
+        )
+    return allocate(context, contents)
+
+
+def texture(context: Any, size: tuple[int, int], channels: int, dtype: str, data: np.ndarray | None = None) -> Any:
+    """A texture of `size`, (width, height). Raises SceneTooLarge, and OutOfMemory, for which moderngl does not
+    check."""
+    most, bytes_ = int(context.info["GL_MAX_TEXTURE_SIZE"]), size[0] * size[1] * channels * int(dtype[1:])
+    if max(size) > most:
+        raise SceneTooLarge(f"a texture of {size[0]} x {size[1]} texels: this driver takes {most} on a side")
+    context.error  # noqa: B018  # an older one is not this texture's
+    short = f"the device has no {bytes_ / 2**20:.0f} MiB left for textures"
+    try:
+        made = context.texture(size, channels, data, dtype=dtype)
+    except Exception as error:  # moderngl.Error is not importable without its binary parts
+        raise OutOfMemory(short) from error
+    if context.error == "GL_OUT_OF_MEMORY":
+        made.release()
+        raise OutOfMemory(short)
+    return made
 
 
 def dispatch(context: Any, kernel: Any, *groups: int, beside: bool = False) -> None:

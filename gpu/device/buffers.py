@@ -10,7 +10,7 @@ from gpu import context as contexts
 from gpu.arrays import SceneArrays
 from gpu.device.pinned import Pinned, pin
 from gpu.device.textures import linear_texture, update_range
-from gpu.errors import OutOfMemory
+from gpu.errors import GpuError
 from gpu.layout import bindings
 from gpu.layout.bindings import Slot
 
@@ -28,17 +28,18 @@ SPARE = 2  # the room for the scene's own tree behind those of instances, in uni
 
 
 def upload(context: Any, array: np.ndarray) -> Any:
-    """A buffer. Raises OutOfMemory."""
+    """A buffer. Raises SceneTooLarge, OutOfMemory."""
     # An empty binding still needs a buffer: llvmpipe reads it even in branches that no lane takes.
     data = np.ascontiguousarray(array).view(np.uint8).reshape(-1) if array.size else np.zeros(96, np.uint8)
-    return contexts.allocate(context, data)
+    return contexts.block(context, data)
 
 
 def shared(context: Any, slot: Slot, arrays: SceneArrays) -> Any:
-    """The buffer of a slot of BUFFERS; the array itself where the driver can use it in place. Raises OutOfMemory."""
+    """The buffer of a slot of BUFFERS; the array itself where the driver can use it in place. Raises SceneTooLarge,
+    OutOfMemory."""
     array = getattr(arrays, BUFFERS[slot])
     if slot == Slot.NODES and len(arrays.instances):
-        buffer = contexts.allocate(context, arrays.instance_nodes.nbytes + SPARE * array.nbytes)
+        buffer = contexts.block(context, arrays.instance_nodes.nbytes + SPARE * array.nbytes)
         _write(buffer, arrays.instance_nodes, 0)
         _write(buffer, array, arrays.instance_nodes.nbytes)
         return buffer
@@ -48,7 +49,7 @@ def shared(context: Any, slot: Slot, arrays: SceneArrays) -> Any:
 def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, Any], textures: dict[int, Any]) -> int:
     """Upload what differs: of BUFFERS all but triangles, instances, the lights' tree. Returns the number of bytes.
 
-    Raises OutOfMemory, and then changes nothing.
+    Raises SceneTooLarge, OutOfMemory, and then changes nothing.
     """
     made, texture, sent = dict[Slot, Any](), None, 0
     differing = [slot for slot, name in BUFFERS.items() if not _equal(getattr(old, name), getattr(new, name))]
@@ -60,7 +61,7 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
                 sent += made[slot].size
         if not _equal(old.light_tree, new.light_tree):
             texture = linear_texture(context, new.light_words, 4, "u4")
-    except OutOfMemory:
+    except GpuError:
         for buffer in made.values():
             buffer.release()
         raise

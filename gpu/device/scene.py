@@ -16,7 +16,7 @@ from gpu.arrays import EnvironmentArrays, SceneArrays
 from gpu.device import buffers, lamps
 from gpu.device.textures import IMAGE_UNITS, KINDS, bound_textures, linear_texture, placeholder
 from gpu.device.uploads import Buffer, SharedUploads, Taken, Textures, UploadCache
-from gpu.errors import OutOfMemory
+from gpu.errors import GpuError
 from gpu.footprint import unshared_bytes
 from gpu.kernels import features
 from gpu.layout import LightKind, bindings
@@ -111,7 +111,7 @@ class Scene:
         self.uploaded = 0  # bytes that edits which move shapes have uploaded
         try:
             self._upload_all()
-        except OutOfMemory:
+        except GpuError:
             self.release()
             raise
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
@@ -167,7 +167,7 @@ class Scene:
         return lamps.brightest(self.arrays) if features.draws_towards_lamps(self._raised) else None
 
     def _upload_environment(self, e: EnvironmentArrays | None) -> _Environment:
-        """Raises OutOfMemory."""
+        """Raises SceneTooLarge, OutOfMemory."""
         texels = np.zeros((1, 1, 4), np.float32)
         scale_max = RADIANCE_MAX
         cells = np.zeros(0, layout.EnvironmentCell.dtype)
@@ -178,12 +178,12 @@ class Scene:
             scale_max = RADIANCE_MAX / max(peak, 1.0)
         height, width = texels.shape[:2]
         buffer = buffers.upload(self._context, cells)
-        texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
+        texture = contexts.texture(self._context, (width, height), 4, "f4", np.ascontiguousarray(texels))
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
         return _Environment(texture, buffer, scale_max, texels.nbytes + buffer.size)
 
     def _take_environment(self, e: EnvironmentArrays | None) -> Taken[_Environment]:
-        """Raises OutOfMemory."""
+        """Raises SceneTooLarge, OutOfMemory."""
         key = "none" if e is None else e.key
         return self._shared.environments.take(key, partial(self._upload_environment, e))
 
@@ -219,7 +219,7 @@ class Scene:
         """Change to `arrays`, which a `SceneEdit` made of the scene's own, and upload what differs, nothing else.
 
         `flags` are those of its kernels then, where the caller has found them already. The caller resets the scene's
-        pictures. Raises OutOfMemory, and then changes nothing.
+        pictures. Raises SceneTooLarge, OutOfMemory, and then changes nothing.
         """
         contexts.use(self._context)
         old, tables, lit = self.arrays, None, None
@@ -230,7 +230,7 @@ class Scene:
             lit = self._take_environment(is_)
         try:
             self.uploaded += buffers.move(self._context, old, arrays, self._buffers, self._details)
-        except OutOfMemory:
+        except GpuError:
             if lit is not None:
                 lit.release()
             raise

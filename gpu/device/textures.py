@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu.arrays import SceneArrays
-from gpu.errors import OutOfMemory
 from gpu.layout import bindings
 
 BYTES = {"f1": 1, "f2": 2, "f4": 4, "u4": 4}
@@ -68,14 +68,7 @@ def linear_texture(context: Any, values: np.ndarray, channels: int, dtype: str) 
     pitch = bindings.TEXELS_A_ROW * channels * BYTES[dtype]
     height, rest = divmod(len(flat), pitch)
     size = (bindings.TEXELS_A_ROW, rows(len(flat), channels, dtype))
-    context.error  # noqa: B018  # clears an older error
-    try:
-        texture = context.texture(size, channels, dtype=dtype)
-    except Exception as error:  # moderngl.Error is not importable without its binary parts
-        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures") from error
-    if context.error == "GL_OUT_OF_MEMORY":
-        texture.release()
-        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures")
+    texture = contexts.texture(context, size, channels, dtype)
     if height:
         texture.write(flat[: height * pitch], viewport=(0, 0, bindings.TEXELS_A_ROW, height))
     if rest:

@@ -65,6 +65,11 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     from service.worker.device.memory import UNLIMITED, default_limit
     from service.worker.loop import Loop
 
+    # NVIDIA's own cache, for what Sunbox does not keep: off for root else, and off where its folder is not there yet.
+    os.environ.setdefault("__GL_SHADER_DISK_CACHE", "1")
+    if folder := os.environ.get("__GL_SHADER_DISK_CACHE_PATH"):
+        with contextlib.suppress(OSError):
+            Path(folder).mkdir(parents=True, exist_ok=True)
     try:
         device = software_device() if arguments.software else arguments.device
         renderer = Renderer(device)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer, RenderSettings
+from gpu import ContextError, Picture, Renderer, RenderSettings, SceneTooLarge
 from gpu import context as contexts
 from gpu.kernels import binaries
 from gpu.kernels.binaries import Program, ProgramBinaries, binary_file
@@ -213,3 +213,25 @@ def test_what_was_not_used_for_longest_goes(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 10
     binaries._prune(tmp_path, 999)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0", "1", "2", "3"]
+
+
+@pytest.mark.parametrize("what", ["storage", "texture"])
+def test_a_scene_beyond_what_the_driver_promises_is_refused(
+    gpu: Renderer, what: str, hardware: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the figure, before anything is drawn from it; the renderer goes on."""
+    values = {"GL_MAX_SHADER_STORAGE_BLOCK_SIZE": 100} if what == "storage" else {"GL_MAX_TEXTURE_SIZE": 8192}
+    sky = Images(sky=np.ones((2, 8200, 3), np.float32))
+    arrays = pack(parse_scene({**LIT, "environment": {"type": "image", "asset": "sky"}}), sky).arrays
+    with monkeypatch.context() as patch:
+        for name, value in values.items():
+            patch.setitem(gpu.context.info, name, value)
+        with pytest.raises(SceneTooLarge, match="MiB at once" if what == "storage" else "8200 x 2 texels"):
+            gpu.load(arrays)
+    gpu.load(arrays).release()
+
+
+def test_a_driver_with_too_few_storage_buffers_is_named(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(contexts, "STORAGE_BLOCKS", 1 << 10)
+    with pytest.raises(ContextError, match="storage buffers; Sunbox needs 1024"):
+        contexts.create()
