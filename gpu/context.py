@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gpu.errors import ContextError, OutOfMemory, SceneTooLarge
+from gpu import egl
+from gpu.errors import ContextError, DeviceLost, OutOfMemory, SceneTooLarge
 
 log = logging.getLogger(__name__)
 _thread = threading.local()
@@ -74,7 +75,7 @@ def create(device: int | None = None) -> Any:
     if device is not None:
         options["device_index"] = device
     try:
-        context = moderngl.create_context(REQUIRED, standalone=True, **options)
+        context = _resettable(device or 0) or moderngl.create_context(REQUIRED, standalone=True, **options)
     except Exception as error:  # glcontext raises bare Exception, moderngl several others
         where = "the default EGL device" if device is None else f"EGL device {device}"
         raise ContextError(
@@ -89,6 +90,33 @@ def create(device: int | None = None) -> Any:
         raise ContextError(f"{renderer} gives a kernel {blocks} storage buffers; Sunbox needs {STORAGE_BLOCKS}")
     log.info("created context", {"driver": context.info["GL_RENDERER"], "version": context.info["GL_VERSION"]})
     return context
+
+
+def _resettable(device: int) -> Any:
+    """A context that says when its device was reset; None where EGL gives none, or none of OpenGL 4.3."""
+    import moderngl
+
+    try:
+        library = egl.functions(ctypes.util.find_library("EGL") or "")
+        backend = egl.EglContext(library, ctypes.CDLL(opengl_library()), device, REQUIRED)
+    except (egl.EglError, AttributeError, OSError) as error:
+        log.info("a reset of the device will not be noticed", {"error": error})
+        return None
+    context = moderngl.create_context(REQUIRED, standalone=True, context=backend)  # type: ignore[arg-type]
+    context.extra = backend
+    return context
+
+
+def finish(context: Any) -> None:
+    """Wait for the device. Raises DeviceLost: what it has of pictures since is not to be shown to anybody."""
+    context.finish()
+    if reason := reset_reason(context):
+        raise DeviceLost(f"the device was reset {reason}")
+
+
+def reset_reason(context: Any) -> str | None:
+    """Why the context's device was reset, in words; None where it was not, or nobody can tell."""
+    return None if context.extra is None else egl.reset(context.extra)
 
 
 def use(context: Any) -> None:

@@ -4,7 +4,8 @@ GpuError
     ContextError       no EGL context: says which package or driver is missing
     CompileError       a kernel that the driver refused, with file and line
     OutOfMemory        buffers that the device would not give
-    SceneTooLarge      more than the layouts can index
+    SceneTooLarge      more than the layouts can index, or the driver promises
+    DeviceLost         the device was reset: what its memory holds means nothing
     WrongThread        a call from another thread than the renderer's own
     NothingRendered    an image asked for before its first sample
 """
@@ -27,6 +28,10 @@ class OutOfMemory(GpuError):
 
 
 class SceneTooLarge(GpuError):
+    pass
+
+
+class DeviceLost(GpuError):
     pass
 
 

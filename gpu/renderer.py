@@ -113,6 +113,12 @@ class Renderer:
         """The number of kernels that were evicted since the renderer was made."""
         return self._kernels.evicted
 
+    @property
+    def reset_reason(self) -> str | None:
+        """Why the device was reset since the renderer was made, in words; None where it was not."""
+        self._own()
+        return contexts.reset_reason(self.context)
+
     def close(self) -> None:
         """Release the context with all that was made from it."""
         self._own()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
+from gpu import context as contexts
 from gpu.picture.schedule import work_groups
 
 if TYPE_CHECKING:
@@ -28,6 +29,6 @@ def dispatch_time(picture: Picture, rows: int, samples: int) -> DispatchTime:
     began = time.perf_counter()
     with query:
         passes._trace(picture._sums.total, tile, tile[:2], tile[2:], 0, samples, work_groups(width, rows))
-    picture.context.finish()
+    contexts.finish(picture.context)
     wall_s = time.perf_counter() - began
     return DispatchTime(wall_s, query.elapsed / 1e9)

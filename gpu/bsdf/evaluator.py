@@ -262,7 +262,7 @@ class _Dispatch:
         for name, value in {**self._uniforms, **uniforms, "first": first, "count": count}.items():
             self._kernel[name].value = value
         contexts.dispatch(self._context, self._kernel, -(-count // BSDF_GROUP))
-        self._context.finish()
+        contexts.finish(self._context)
 
     def release(self) -> None:
         contexts.use(self._context)

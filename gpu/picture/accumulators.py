@@ -107,7 +107,7 @@ class Accumulators:
         kernel["first"].value, kernel["count"].value = first - begins, count
         kernel["moment_scale"].value = self.moment_scale
         contexts.dispatch(self._context, kernel, *work_groups(_LINE, -(-count // _LINE)))
-        self._context.finish()
+        contexts.finish(self._context)
 
     def end_block(self) -> None:
         """End the block, all of which was merged."""

@@ -113,7 +113,7 @@ class LightPaths:
         start = time.perf_counter()
         self._dispatcher.bind()
         self._start((0, 0, 0, 0), 0, 1, (1, 1))
-        self._dispatcher.context.finish()
+        contexts.finish(self._dispatcher.context)
         return (time.perf_counter() - start) * 1e3
 
     def trace(self, tile: Tile, first: int, samples: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
@@ -113,7 +114,7 @@ class Passes:
             tile, first, samples = tracer.next(self._tiles, self._most_samples)
             began = time.perf_counter()
             self._trace(self._sums.block, tile, tile[:2], tile[2:], first, samples, work_groups(tile[2], tile[3]))
-            self._dispatcher.context.finish()
+            contexts.finish(self._dispatcher.context)
             self._tiles.took(tile, samples, time.perf_counter() - began)
             tracer.took(tile, self._dispatcher.settings.width)
             if time.perf_counter() >= enough:
@@ -173,7 +174,7 @@ class Passes:
         d.bind_part(self._sums.total, (0, 0, 1, 1), 1)
         self.schedule.bind()
         d.run(self._kernel, d.uniforms((0, 0), (0, 0), 0, 1), (1, 1))
-        d.context.finish()
+        contexts.finish(d.context)
         self.compile_ms += (time.perf_counter() - start) * 1e3
 
     @property
@@ -243,7 +244,7 @@ class Passes:
         tile = tiles.tile(row, self._column, samples)
         start = time.perf_counter()
         self._light.trace(tile, self.samples, samples)
-        self._dispatcher.context.finish()
+        contexts.finish(self._dispatcher.context)
         tiles.took(tile, samples, time.perf_counter() - start)
         self._advance(tile, tiles.size[0])
 
@@ -309,7 +310,7 @@ class Passes:
 
     def _took(self, tiles: Schedule, tile: Tile, samples: int, start: float) -> None:
         """Wait for the tile that began at `start`, and advance to the next one."""
-        self._dispatcher.context.finish()
+        contexts.finish(self._dispatcher.context)
         tiles.took(tile, samples, time.perf_counter() - start)
         self._advance(tile, tiles.size[0])
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
 from gpu.layout.pixel_layers import COVER_VECTORS
@@ -121,4 +122,4 @@ class Readout:
         uniforms = d.uniforms(tile[:2], tile[2:], sample, 1)
         uniforms["slot_first"] = d.bind_part(hits.buffers, tile, d.settings.width, vectors)
         d.run(kernel, uniforms, work_groups(tile[2], tile[3]))
-        d.context.finish()
+        contexts.finish(d.context)

@@ -85,7 +85,7 @@ class Precompiler:
         for block in (bindings.UNIFORM_BLOCK, bindings.FILTER_BLOCK, *bindings.COUNTED.values()):
             self._zeros.bind_to_uniform_block(block)
         contexts.dispatch(self._context, kernel, 1, 1)
-        self._context.finish()
+        contexts.finish(self._context)
         self._binaries.store(wanted.entry, text, kernel)
         seconds = time.process_time() - start
         for thing in (kernel, *textures):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
+from gpu import DeviceLost, GpuError, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
@@ -252,12 +252,14 @@ class Loop:
         try:
             work()
             return
-        except channel.Closed:
+        except (channel.Closed, DeviceLost):  # the process ends, and another one goes on from checkpoints
             raise
         except GpuError as error:
+            self._look_for_reset()
             log.warning("task failed", {"task": task.number, "kind": type(error).__name__, "error": error})
             detail, refused = str(error), isinstance(error, SceneTooLarge | OutOfMemory)
         except Exception:
+            self._look_for_reset()  # of a lost context moderngl maps no memory
             log.exception("task failed", {"task": task.number})
             detail, refused = "The renderer made a mistake; its log says which.", False
         if read is None:
@@ -265,6 +267,10 @@ class Loop:
         if isinstance(task, Assistant):
             return self._send(LeaseFailed(task.number, task.attempted, detail))
         self._send(Failed(task.number, task.attempted, detail, refused, read.serial if read else None))
+
+    def _look_for_reset(self) -> None:
+        if reason := self._renderer.reset_reason:
+            raise DeviceLost(f"the device was reset {reason}")
 
     def _send(self, message: FromRenderer) -> None:
         channel.send(self._end, message)

@@ -63,7 +63,7 @@ def passes_on(device: Device, size: tuple[int, int]) -> Passes:
     def uniforms(origin: Any, tile: tuple[int, int], first: int, count: int) -> dict[str, Any]:
         return {"size": tile, "count": count}
 
-    context = SimpleNamespace(finish=device.finish)
+    context = SimpleNamespace(finish=device.finish, extra=None)
     dispatcher = SimpleNamespace(
         context=context, settings=settings, is_software=False, most_pixels=1 << 27, bind=lambda: None,
         bind_part=lambda *given: 0, uniforms=uniforms, run=run, run_beside=run,

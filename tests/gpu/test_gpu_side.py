@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import ctypes
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from gpu import ContextError, Picture, Renderer, RenderSettings, SceneTooLarge
+from gpu import ContextError, DeviceLost, Picture, Renderer, RenderSettings, SceneTooLarge, egl
 from gpu import context as contexts
 from gpu.kernels import binaries
 from gpu.kernels.binaries import Program, ProgramBinaries, binary_file
@@ -235,3 +236,40 @@ def test_a_driver_with_too_few_storage_buffers_is_named(gpu: Renderer, monkeypat
     monkeypatch.setattr(contexts, "STORAGE_BLOCKS", 1 << 10)
     with pytest.raises(ContextError, match="storage buffers; Sunbox needs 1024"):
         contexts.create()
+
+
+@pytest.fixture
+def lost(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """What the driver says of resets from now on."""
+    said = [0]
+    monkeypatch.setattr(egl, "_reset_status", lambda address: lambda: said[0])
+    yield said
+
+
+def test_after_a_reset_nothing_is_shown(gpu: Renderer, lost: list[int]) -> None:
+    made = picture(gpu, LIT, 8, width=16, height=16)
+    lost[0] = 0x8254
+    assert gpu.reset_reason == "by another program"
+    with pytest.raises(DeviceLost, match="by another program"):
+        made.trace(1.0, 16)
+    lost[0] = 0
+    made.trace(1.0, 16)
+
+
+def test_a_context_without_that_is_taken_as_well(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where EGL refuses, moderngl makes the context, and nobody hears of resets."""
+
+    def refused(*given: Any) -> Any:
+        raise egl.EglError("no such attribute")
+
+    monkeypatch.setattr(egl, "EglContext", refused)
+    with FamilyRenderer() as renderer:
+        assert renderer.reset_reason is None
+        assert picture(renderer, LIT, 1, width=8, height=8).samples == 1
+
+
+def test_the_context_is_lost_where_its_device_is_reset(gpu: Renderer) -> None:
+    """So that the driver says it: GL_RESET_NOTIFICATION_STRATEGY is GL_LOSE_CONTEXT_ON_RESET."""
+    value = ctypes.c_int(0)
+    ctypes.CDLL(contexts.opengl_library()).glGetIntegerv(0x8256, ctypes.byref(value))
+    assert value.value == 0x8252 and gpu.reset_reason is None

@@ -1,0 +1,124 @@
+"""A headless context by EGL that says when its device was reset, for moderngl, whose own backend asks for none."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Any
+
+PLATFORM_DEVICE, OPENGL_API = 0x313F, 0x30A2  # EGL_PLATFORM_DEVICE_EXT, EGL_OPENGL_API
+SURFACE_TYPE, PBUFFER, RENDERABLE_TYPE, OPENGL, NONE = 0x3033, 1, 0x3040, 8, 0x3038
+MAJOR, MINOR, PROFILE, CORE = 0x3098, 0x30FB, 0x30FD, 1
+# EGL 1.5, 3.7.1: what was allocated and is under way may be lost, and the context says so from then on.
+RESET_STRATEGY, LOSE_ON_RESET = 0x31BD, 0x31BF
+RESETS = {0x8253: "by what it was doing", 0x8254: "by another program", 0x8255: "for an unknown reason"}
+
+Pointer = ctypes.c_void_p
+
+
+class EglError(Exception):
+    """What EGL refused."""
+
+
+class EglContext:
+    """What moderngl takes for a context: it is made current by `with`, and finds OpenGL's functions."""
+
+    def __init__(self, egl: ctypes.CDLL, opengl: ctypes.CDLL, device: int, version: int) -> None:
+        """A core context of OpenGL `version` (430) on EGL's device of that number, which is current afterwards.
+
+        Raises EglError.
+        """
+        self._egl, self._opengl = egl, opengl
+        self._display = _display(egl, device)
+        attributes = [MAJOR, version // 100, MINOR, version // 10 % 10, PROFILE, CORE, RESET_STRATEGY, LOSE_ON_RESET]
+        wanted = [SURFACE_TYPE, PBUFFER, RENDERABLE_TYPE, OPENGL]
+        config, count = Pointer(), ctypes.c_int(0)
+        egl.eglBindAPI(OPENGL_API)
+        if not egl.eglChooseConfig(self._display, _list(wanted), ctypes.byref(config), 1, ctypes.byref(count)):
+            raise EglError(f"eglChooseConfig: {_error(egl)}")
+        if count.value < 1:
+            raise EglError("no configuration for OpenGL")
+        egl.eglCreateContext.restype = Pointer
+        self._context = egl.eglCreateContext(self._display, config, None, _list(attributes))
+        if not self._context:
+            raise EglError(f"eglCreateContext: {_error(egl)}")
+        if not self._current(self._context):
+            error = _error(egl)
+            egl.eglDestroyContext(self._display, Pointer(self._context))
+            raise EglError(f"eglMakeCurrent: {error}")
+
+    def load_opengl_function(self, name: str) -> int:
+        """Its address, 0 where there is none."""
+        address = self._egl.eglGetProcAddress(name.encode())
+        if not address:
+            found = getattr(self._opengl, name, None)
+            address = None if found is None else ctypes.cast(found, Pointer).value
+        return address or 0
+
+    load = load_opengl_function
+
+    def __enter__(self) -> EglContext:
+        self._current(self._context)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._current(None)
+
+    def release(self) -> None:
+        self._current(None)
+        self._egl.eglDestroyContext(self._display, Pointer(self._context))
+
+    def _current(self, context: int | None) -> bool:
+        return bool(self._egl.eglMakeCurrent(self._display, None, None, Pointer(context)))
+
+
+def functions(egl: str) -> ctypes.CDLL:
+    """EGL's library, with the types of what is called."""
+    library = ctypes.CDLL(egl)
+    library.eglGetProcAddress.restype, library.eglGetProcAddress.argtypes = Pointer, [ctypes.c_char_p]
+    library.eglChooseConfig.argtypes = [Pointer, Pointer, Pointer, ctypes.c_int, Pointer]
+    library.eglCreateContext.restype, library.eglCreateContext.argtypes = Pointer, [Pointer] * 4
+    library.eglMakeCurrent.argtypes, library.eglDestroyContext.argtypes = [Pointer] * 4, [Pointer] * 2
+    library.eglInitialize.argtypes = [Pointer] * 3
+    return library
+
+
+def _display(egl: ctypes.CDLL, device: int) -> Any:
+    """The display of EGL's device of that number, initialised."""
+    places = [egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT")]
+    if None in places:
+        raise EglError("no EGL_EXT_platform_device")
+    query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, Pointer, Pointer)(places[0])
+    display_of = ctypes.CFUNCTYPE(Pointer, ctypes.c_uint, Pointer, Pointer)(places[1])
+    count = ctypes.c_int(0)
+    query(0, None, ctypes.byref(count))
+    if device >= count.value:
+        raise EglError(f"there is no EGL device {device}; there are {count.value}")
+    handles = (Pointer * count.value)()
+    query(count.value, handles, ctypes.byref(count))
+    display = display_of(PLATFORM_DEVICE, handles[device], None)
+    if not display or not egl.eglInitialize(display, None, None):
+        raise EglError(f"eglInitialize: {_error(egl)}")
+    return Pointer(display)
+
+
+def _list(values: list[int]) -> Any:
+    return (ctypes.c_int * (len(values) + 1))(*values, NONE)
+
+
+def _error(egl: ctypes.CDLL) -> str:
+    return f"error 0x{egl.eglGetError():04x}"
+
+
+@cache
+def _reset_status(address: int) -> Any:
+    return ctypes.CFUNCTYPE(ctypes.c_uint)(address)
+
+
+def reset(context: EglContext) -> str | None:
+    """Why the device was reset since the context was made, in words; None where it was not, or nobody can tell."""
+    for name in ("glGetGraphicsResetStatus", "glGetGraphicsResetStatusARB"):
+        if address := context.load_opengl_function(name):
+            status = _reset_status(address)()
+            return RESETS.get(status, f"status 0x{status:04x}") if status else None
+    return None
