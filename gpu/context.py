@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes.util
 import logging
 import threading
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,34 +20,17 @@ STORAGE_BLOCKS = 16  # of the largest kernel; OpenGL 4.3 promises 8, and drivers
 PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
 DEDICATED_VIDEO_MEMORY = 0x9047  # GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render driver")
-EXTENSIONS, DRM_FILE = 0x3055, 0x3233  # EGL_EXTENSIONS and EGL_DRM_DEVICE_FILE_EXT, which EGL tells of a device
 
 
-@dataclass(frozen=True)
-class Device:
-    """One of EGL's devices; their numbers are their places in the list."""
-
-    name: str
-    software: bool
-
-
-def devices() -> list[Device]:
-    """EGL's devices, by EGL_EXT_device_enumeration and EGL_EXT_device_query. Raises ContextError without libEGL."""
+def devices() -> list[egl.Device]:
+    """EGL's devices; their numbers are their places in the list. Raises ContextError without libEGL."""
     found = ctypes.util.find_library("EGL")
     if found is None:
         raise ContextError(f"libEGL is not installed: on Debian `apt-get install {PACKAGES}`")
-    address = ctypes.CDLL(found).eglGetProcAddress
-    address.restype, address.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
-    pointer, count = ctypes.c_void_p, ctypes.c_int(0)
-    places = address(b"eglQueryDevicesEXT"), address(b"eglQueryDeviceStringEXT")
-    if None in places:
-        raise ContextError("this libEGL cannot list its devices (EGL_EXT_device_base)")
-    query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, pointer, pointer)(places[0])
-    text = ctypes.CFUNCTYPE(ctypes.c_char_p, pointer, ctypes.c_int)(places[1])
-    query(0, None, ctypes.byref(count))
-    handles = (pointer * count.value)()
-    query(count.value, handles, ctypes.byref(count))
-    return [_device(text, handle) for handle in handles[: count.value]]
+    try:
+        return egl.devices(egl.functions(found))
+    except egl.EglError as error:
+        raise ContextError(f"this libEGL cannot list its devices ({error})") from None
 
 
 def software_device() -> int:
@@ -223,14 +205,6 @@ def _memory(context: Any) -> int | None:
     kibibytes = ctypes.c_int(0)
     ctypes.CDLL(opengl_library()).glGetIntegerv(DEDICATED_VIDEO_MEMORY, ctypes.byref(kibibytes))
     return kibibytes.value * 1024 if kibibytes.value > 0 else None
-
-
-def _device(text: Any, handle: int | None) -> Device:
-    extensions = (text(handle, EXTENSIONS) or b"").decode().split()
-    if "EGL_MESA_device_software" in extensions:
-        return Device("software", True)
-    file = text(handle, DRM_FILE) if "EGL_EXT_device_drm" in extensions else None
-    return Device("GPU" if file is None else file.decode(), False)
 
 
 def opengl_library() -> str | None:

@@ -1,8 +1,10 @@
-"""A headless context by EGL that says when its device was reset, for moderngl, whose own backend asks for none."""
+"""EGL's devices, and a headless context that says when its device was reset, which moderngl's backend asks for
+nowhere."""
 
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -13,11 +15,26 @@ MAJOR, MINOR, PROFILE, CORE = 0x3098, 0x30FB, 0x30FD, 1
 RESET_STRATEGY, LOSE_ON_RESET = 0x31BD, 0x31BF
 RESETS = {0x8253: "by what it was doing", 0x8254: "by another program", 0x8255: "for an unknown reason"}
 
+# What EGL tells of a device: EGL_EXT_device_query, _device_drm, _device_query_name and _device_persistent_id, and
+# EGL_NV_device_cuda.
+EXTENSIONS, VENDOR, DRM_FILE, RENDERER, UUID, CUDA_DEVICE = 0x3055, 0x3053, 0x3233, 0x335F, 0x335C, 0x323A
+
 Pointer = ctypes.c_void_p
 
 
 class EglError(Exception):
     """What EGL refused."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """One of EGL's devices: its `name` as far as EGL says it, its number among CUDA's devices, and its UUID, 32
+    hexadecimal digits; None and "" where EGL does not say."""
+
+    name: str
+    software: bool
+    cuda: int | None = None
+    uuid: str = ""
 
 
 class EglContext:
@@ -83,19 +100,74 @@ def functions(egl: str) -> ctypes.CDLL:
     return library
 
 
-def _display(egl: ctypes.CDLL, device: int) -> Any:
-    """The display of EGL's device of that number, initialised."""
-    places = [egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT")]
-    if None in places:
-        raise EglError("no EGL_EXT_platform_device")
-    query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, Pointer, Pointer)(places[0])
-    display_of = ctypes.CFUNCTYPE(Pointer, ctypes.c_uint, Pointer, Pointer)(places[1])
-    count = ctypes.c_int(0)
+def devices(egl: ctypes.CDLL) -> list[Device]:
+    """EGL's devices. Raises EglError where it cannot list them."""
+    ask = Questions(egl)
+    return [described(ask, handle) for handle in _handles(egl)]
+
+
+class Questions:
+    """What EGL can be asked of a device."""
+
+    def __init__(self, egl: ctypes.CDLL) -> None:
+        address = egl.eglGetProcAddress
+        kinds_of = b"String", b"Attrib", b"Binary"
+        string, number, binary = (address(b"eglQueryDevice%sEXT" % kind) for kind in kinds_of)
+        if not string:
+            raise EglError("no EGL_EXT_device_base")
+        self._string = ctypes.CFUNCTYPE(ctypes.c_char_p, Pointer, ctypes.c_int)(string)
+        kinds = ctypes.c_uint, Pointer, ctypes.c_int
+        self._number = ctypes.CFUNCTYPE(*kinds, Pointer)(number) if number else None
+        self._binary = ctypes.CFUNCTYPE(*kinds, ctypes.c_int, Pointer, Pointer)(binary) if binary else None
+
+    def string(self, device: Any, name: int) -> str:
+        return (self._string(device, name) or b"").decode(errors="replace")
+
+    def number(self, device: Any, name: int) -> int | None:
+        value = ctypes.c_ssize_t(0)
+        return value.value if self._number and self._number(device, name, ctypes.byref(value)) else None
+
+    def binary(self, device: Any, name: int) -> bytes:
+        value, size = ctypes.create_string_buffer(16), ctypes.c_int(0)
+        able = self._binary and self._binary(device, name, len(value), value, ctypes.byref(size))
+        return value.raw[: size.value] if able else b""
+
+
+def described(ask: Questions, device: Any) -> Device:
+    extensions = ask.string(device, EXTENSIONS).split()
+    names = []
+    if "EGL_EXT_device_query_name" in extensions:
+        names = [ask.string(device, VENDOR), ask.string(device, RENDERER)]
+    if "EGL_EXT_device_drm" in extensions:
+        names.append(ask.string(device, DRM_FILE))
+    software = "EGL_MESA_device_software" in extensions
+    return Device(
+        "software" if software else ", ".join(filter(None, names)) or "GPU",
+        software,
+        ask.number(device, CUDA_DEVICE) if "EGL_NV_device_cuda" in extensions else None,
+        ask.binary(device, UUID).hex() if "EGL_EXT_device_persistent_id" in extensions else "",
+    )
+
+
+def _handles(egl: ctypes.CDLL) -> list[int | None]:
+    place, count = egl.eglGetProcAddress(b"eglQueryDevicesEXT"), ctypes.c_int(0)
+    if not place:
+        raise EglError("no EGL_EXT_device_base")
+    query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, Pointer, Pointer)(place)
     query(0, None, ctypes.byref(count))
-    if device >= count.value:
-        raise EglError(f"there is no EGL device {device}; there are {count.value}")
     handles = (Pointer * count.value)()
     query(count.value, handles, ctypes.byref(count))
+    return list(handles[: count.value])
+
+
+def _display(egl: ctypes.CDLL, device: int) -> Any:
+    """The display of EGL's device of that number, initialised."""
+    place, handles = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT"), _handles(egl)
+    if not place:
+        raise EglError("no EGL_EXT_platform_device")
+    if device >= len(handles):
+        raise EglError(f"there is no EGL device {device}; there are {len(handles)}")
+    display_of = ctypes.CFUNCTYPE(Pointer, ctypes.c_uint, Pointer, Pointer)(place)
     display = display_of(PLATFORM_DEVICE, handles[device], None)
     if not display or not egl.eglInitialize(display, None, None):
         raise EglError(f"eglInitialize: {_error(egl)}")

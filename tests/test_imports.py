@@ -64,7 +64,7 @@ LAYERS = [
     {"service.cli"},
 ]
 GPU_LAYERS = [
-    {"gpu.layout", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"},
+    {"gpu.layout", "gpu.egl", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"},
     {"gpu.tables", "gpu.accel"},
     {"gpu.arrays", "gpu.context", "gpu.footprint"},
     {"gpu.kernels"},

@@ -273,3 +273,37 @@ def test_the_context_is_lost_where_its_device_is_reset(gpu: Renderer) -> None:
     value = ctypes.c_int(0)
     ctypes.CDLL(contexts.opengl_library()).glGetIntegerv(0x8256, ctypes.byref(value))
     assert value.value == 0x8252 and gpu.reset_reason is None
+
+
+class Card:
+    """What EGL says of a device."""
+
+    def __init__(self, extensions: str, said: dict[int, Any]) -> None:
+        self._said = {egl.EXTENSIONS: extensions, **said}
+
+    def string(self, device: Any, name: int) -> str:
+        return str(self._said.get(name, ""))
+
+    def number(self, device: Any, name: int) -> Any:
+        return self._said.get(name)
+
+    def binary(self, device: Any, name: int) -> bytes:
+        return bytes(self._said.get(name, b""))
+
+
+@pytest.mark.parametrize(
+    ("extensions", "expected"),
+    [
+        ("", egl.Device("GPU", False)),
+        ("EGL_MESA_device_software EGL_EXT_device_drm", egl.Device("software", True)),
+        ("EGL_EXT_device_drm", egl.Device("/dev/dri/card1", False)),
+        ("EGL_EXT_device_query_name EGL_EXT_device_drm", egl.Device("NVIDIA, H200, /dev/dri/card1", False)),
+        ("EGL_NV_device_cuda EGL_EXT_device_persistent_id", egl.Device("GPU", False, 3, "0a" * 16)),
+    ],
+)
+def test_what_egl_says_of_a_device(extensions: str, expected: egl.Device) -> None:
+    """Nothing is asked that it does not know."""
+    said = {egl.VENDOR: "NVIDIA", egl.RENDERER: "H200", egl.DRM_FILE: "/dev/dri/card1", egl.CUDA_DEVICE: 3,
+            egl.UUID: b"\n" * 16}  # fmt: skip
+    card: Any = Card(extensions, said)
+    assert egl.described(card, None) == expected

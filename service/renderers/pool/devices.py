@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from typing import Any
 
 from service.config import Config, cores
 from service.renderers.local.process import ROOT, Options
@@ -48,9 +49,21 @@ def missing_device(config: Config) -> str | None:
     """
     if not config.devices:
         return None
+    try:
+        return _missing(config, listed())
+    except NoDevices as error:
+        return f"SUNBOX_DEVICES: {error}"
+
+
+class NoDevices(Exception):
+    """Why EGL's devices could not be listed, or why none of them is the one that was asked for."""
+
+
+def listed() -> list[dict[str, Any]]:
+    """EGL's devices, in a process of its own: `gpu.egl.Device` as dictionaries. Raises NoDevices."""
     command = [sys.executable, "-m", LISTING]
     try:
-        listed = subprocess.run(
+        done = subprocess.run(
             command,
             env=inherited_environment(),
             cwd=ROOT,
@@ -59,12 +72,28 @@ def missing_device(config: Config) -> str | None:
             timeout=LISTING_S,
             check=True,
         )
-        found = json.loads(listed.stdout)
+        found = json.loads(done.stdout)
     except (OSError, subprocess.SubprocessError, ValueError) as error:
-        return f"SUNBOX_DEVICES: EGL's devices could not be listed: {error}"
+        raise NoDevices(f"EGL's devices could not be listed: {error}") from None
     if "error" in found:
-        return f"SUNBOX_DEVICES: {found['error']}"
-    return _missing(config, found["devices"])
+        raise NoDevices(found["error"])
+    devices: list[dict[str, Any]] = found["devices"]
+    return devices
+
+
+def of_cuda(id: str, devices: list[dict[str, Any]]) -> int:
+    """The number of EGL's device that CUDA calls `id`: a number, or "GPU-" and a UUID. EGL has an order of its own,
+    and takes no notice of CUDA_VISIBLE_DEVICES. Raises NoDevices."""
+    there = ", ".join(f"{i} ({device['name']})" for i, device in enumerate(devices)) or "none at all"
+    if id.startswith("MIG-"):
+        raise NoDevices(f"{id}: a GPU that is divided by MIG has no OpenGL")
+    wanted = id.removeprefix("GPU-").replace("-", "").lower()
+    for number, device in enumerate(devices):
+        if device["uuid"] == wanted if id.startswith("GPU-") else str(device["cuda"]) == id:
+            return number
+    if id.isdecimal() and all(device["cuda"] is None for device in devices) and int(id) < len(devices):
+        return int(id)  # of another vendor, whose numbers Ray counts alike
+    raise NoDevices(f"none of EGL's devices is the GPU {id} of CUDA; EGL has {there}")
 
 
 def _missing(config: Config, devices: list[dict[str, object]]) -> str | None:

@@ -13,6 +13,7 @@ from service.config import cores
 from service.ipc import channel
 from service.ipc.messages import FromRenderer, Ready, SceneData, ToRenderer, Update
 from service.renderers.local.process import Options, Process
+from service.renderers.pool.devices import listed, of_cuda
 from service.renderers.ray.code import version
 from service.renderers.ray.control import Ended
 from service.system.memory import MemoryBudget
@@ -46,7 +47,8 @@ class Renderer:
         self._lifeline = self._lifeline or os.pipe()
         share = 1.0 if threads is None else min(1.0, threads / cores())
         memory = int(MemoryBudget().limit * share)
-        given = Options(device=_gpu(), software=threads is not None, cores=threads, host_memory=memory, **options)
+        device = None if threads is not None else await asyncio.to_thread(_gpu)
+        given = Options(device=device, software=threads is not None, cores=threads, host_memory=memory, **options)
         process = Process(
             given, lambda message: self._received(process, message), lambda: self._lose(process), self._lifeline[0]
         )
@@ -129,8 +131,8 @@ class Renderer:
 
 
 def _gpu() -> int | None:
-    """The number of the GPU that Ray gave to this actor; None where it gave none."""
+    """EGL's number of the GPU that Ray gave to this actor; None where it gave none. Raises NoDevices."""
     import ray
 
-    numbers = ray.get_gpu_ids()
-    return int(numbers[0]) if numbers else None
+    ids = ray.get_gpu_ids()
+    return of_cuda(str(ids[0]), listed()) if ids else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -20,7 +21,7 @@ from service.ipc import channel
 from service.renderers.local import process
 from service.renderers.local.process import THREADS, Options
 from service.renderers.pool import devices as seating
-from service.renderers.pool.devices import missing_device, seats
+from service.renderers.pool.devices import NoDevices, missing_device, of_cuda, seats
 from service.system.child_processes import inherited_environment
 from service.worker.helpers import compile_main
 from tests.serving import Server
@@ -176,3 +177,34 @@ def test_spare_compilers_wait_for_each_other_and_nobody_for_them(tmp_path: Path)
                 assert not done.wait(0.2)
         other.join(10)
         assert done.is_set()
+
+
+CARDS = [
+    {"name": "b", "software": False, "cuda": 1, "uuid": "0b" * 16},
+    {"name": "software", "software": True, "cuda": None, "uuid": ""},
+    {"name": "a", "software": False, "cuda": 0, "uuid": "0a" * 16},
+]
+OTHERS = [{"name": "amd", "software": False, "cuda": None, "uuid": ""}]
+
+
+@pytest.mark.parametrize(
+    ("id", "devices", "expected"),
+    [
+        ("0", CARDS, 2),
+        ("1", CARDS, 0),
+        ("GPU-0a0a0a0a-0a0a-0a0a-0a0a-0a0a0a0a0a0a", CARDS, 2),
+        ("0", OTHERS, 0),
+        ("2", CARDS, "none of EGL's devices is the GPU 2 of CUDA; EGL has 0 (b), 1 (software), 2 (a)"),
+        ("1", OTHERS, "none of EGL's devices"),
+        ("GPU-0c", CARDS, "none of EGL's devices"),
+        ("MIG-1", CARDS, "divided by MIG"),
+        ("0", [], "EGL has none at all"),
+    ],
+)
+def test_the_gpu_that_ray_gives(id: str, devices: list[dict[str, Any]], expected: int | str) -> None:
+    """By CUDA's number or UUID, as EGL's order is its own."""
+    if isinstance(expected, int):
+        assert of_cuda(id, devices) == expected
+    else:
+        with pytest.raises(NoDevices, match=re.escape(expected)):
+            of_cuda(id, devices)
