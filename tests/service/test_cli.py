@@ -183,10 +183,10 @@ def test_time_limit_is_kept_and_ends_between_samples(
     """On a machine where a sample of a pixel takes a microsecond, and nothing else takes time."""
     now_s, trace = 1000.0, passes.Passes._trace
 
-    def traced(*arguments: Any) -> None:
+    def traced(*arguments: Any, **named: Any) -> None:
         nonlocal now_s
         _, _, _, _, (width, height), _, samples, _ = arguments
-        trace(*arguments)
+        trace(*arguments, **named)
         now_s += width * height * samples * 1e-6
 
     clock = SimpleNamespace(monotonic=lambda: now_s, perf_counter=lambda: now_s)
