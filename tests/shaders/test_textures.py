@@ -316,7 +316,9 @@ def preprocessed(entry: str, defines: dict[str, object]) -> str:
             words = {name: str(value).rstrip("u") for name, value in known.items()}
             asked = re.sub(r"[A-Za-z_]\w*", lambda m: words[m[0]], rest.split("//")[0])  # noqa: B023
             yes = bool(eval(re.sub(r"!(?!=)", " not ", asked.replace("&&", " and ").replace("||", " or "))))
-        if word == "#if":
+        if word == "#ifdef":
+            yes = rest in known
+        if word in ("#if", "#ifdef"):
             taken.append(taken[-1] and yes)
             done.append(yes)
         elif word in ("#elif", "#else"):
