@@ -7,7 +7,7 @@ settings    the choices that change pixels
 steps       long work in steps, between which the caller may do something else
 errors      what can go wrong on the GPU
 context     a headless OpenGL context
-egl         a context by EGL that says when its device was reset
+egl         EGL's devices; a context that says when its device was reset
 denoise     Open Image Denoise over pixels that were read back; public, without GL
 footprint   how many bytes of the device a scene and a picture take
 jit         machine code for the few loops that numpy cannot express

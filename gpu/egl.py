@@ -55,7 +55,6 @@ class EglContext:
             raise EglError(f"eglChooseConfig: {_error(egl)}")
         if count.value < 1:
             raise EglError("no configuration for OpenGL")
-        egl.eglCreateContext.restype = Pointer
         self._context = egl.eglCreateContext(self._display, config, None, _list(attributes))
         if not self._context:
             raise EglError(f"eglCreateContext: {_error(egl)}")

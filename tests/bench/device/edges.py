@@ -8,27 +8,23 @@ import numpy as np
 import trimesh
 
 from gpu import Renderer
-from service.assets import ImageData, MeasuredData, MeshData
+from service.assets import MeshData
 from service.bench.device import stage
 from service.pack import pack
 from service.scene import parse_scene
 from tests.bench.device.part import Options, Row
+from tests.rendering import Images
 
 SIZE, SAMPLES = (512, 512), 64
 
 
-class _Assets:
+class _Mesh(Images):
     def __init__(self, mesh: MeshData) -> None:
+        super().__init__()
         self._mesh = mesh
 
     def mesh(self, ref: str) -> MeshData:
         return self._mesh
-
-    def image(self, ref: str) -> ImageData:
-        raise NotImplementedError
-
-    def measured(self, ref: str) -> MeasuredData:
-        raise NotImplementedError
 
 
 def meshes() -> dict[str, MeshData]:
@@ -59,7 +55,7 @@ def rows(options: Options) -> Iterator[Row]:
                         {"type": "sphere", "center": [0, 0, 0], "radius": 0.9, "material": "lamp"},
                     ],
                 }  # fmt: skip
-                arrays = pack(parse_scene(document), _Assets(mesh)).arrays
+                arrays = pack(parse_scene(document), _Mesh(mesh)).arrays
                 scene = renderer.load(arrays)
                 picture = renderer.picture(scene, stage.settings(size, max_bounces=1))
                 while picture.samples < samples:
