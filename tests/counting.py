@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import selectors
 import sys
 from collections.abc import Callable, Coroutine
@@ -20,11 +21,14 @@ def python_lines(work: Callable[[], object]) -> int:
         count += event == "line"
         return trace
 
+    gc.collect()
+    gc.disable()  # else finalizers of others' objects would count
     sys.settrace(trace)
     try:
         work()
     finally:
         sys.settrace(before)
+        gc.enable()
     return count
 
 

@@ -25,6 +25,7 @@ from tests import kernel_count
 COLD_S = 150.0  # caches are empty: every kernel is compiled
 AHEAD = "SUNBOX_AHEAD"  # the setting that tests turn off, but those of what is compiled ahead
 KEYS = ("anna-key", "bert-key")  # of the strict server
+SPARE_KEY = "cara-key"  # another one, of whose assets a single test counts the bytes
 CALLBACK_SECRETS = ("whsec_" + "c3VuYm94" * 4, "whsec_" + "b3RoZXIh" * 4)  # of the mortal one
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
