@@ -62,6 +62,7 @@ from service.state import MESSAGE_BYTES, AppState
 from service.storage.data_lock import FolderInUse, locked
 from service.storage.database import DamagedFile
 from service.storage.stores import storage
+from service.system.background import Background, report_callbacks, reported
 from service.system.confined import hide
 from service.system.memory import MemoryBudget
 
@@ -226,7 +227,8 @@ class _Server(uvicorn.Server):
 
     async def on_tick(self, counter: int) -> bool:
         if counter % TICKS == 0:
-            self._watch.look(self.server_state.connections)
+            with reported("watch of connections"):
+                self._watch.look(self.server_state.connections)
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -270,17 +272,22 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     state: AppState = app.state.sunbox
     state.renderers.start()
     state.storage.assets.start()
-    asking = asyncio.create_task(asyncio.to_thread(state.storage.assets.rights))  # which logs them
+    report_callbacks(asyncio.get_running_loop())
+    chores = Background()
+    chores.start("check of the parsers' sandbox", _ask_for_rights(state))
     await state.resume_renders()
-    state.warming = asyncio.create_task(_warm(app))
+    state.warming = chores.start("first frame", _warm(app))
     yield
-    asking.cancel()
     await state.farewell()
     await state.renderers.close()
     await asyncio.to_thread(state.storage.assets.close)
     state.bodies.close()
     if state.render_queue.store is not None:
         await state.render_queue.store.close()
+
+
+async def _ask_for_rights(state: AppState) -> None:
+    await asyncio.to_thread(state.storage.assets.rights)  # which logs them
 
 
 async def _warm(app: FastAPI) -> None:

@@ -142,6 +142,9 @@ class Internal(ServiceError):
     pass
 
 
+MISTAKE = "The server made a mistake; its log says which."  # of an Internal that no request can avoid
+
+
 @dataclass(frozen=True)
 class Answer:
     """How HTTP answers one class of error."""

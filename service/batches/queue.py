@@ -15,6 +15,7 @@ from service.renders.job import Job
 from service.renders.queue import RETRY_S, RenderQueue
 from service.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.renders.store.record import IdempotencyKey
+from service.system.background import Background
 from service.system.executors import parsing, recording
 
 EACH = 32  # batches of one owner that are under way
@@ -30,7 +31,7 @@ class BatchQueue:
         """`ahead`: renders of a batch that wait or run at a time."""
         self._renders, self._members, self._ahead = renders, members, ahead
         self._batches: dict[str, Batch] = {}  # in the order of arrival
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = Background()
 
     async def submit(
         self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
@@ -116,14 +117,10 @@ class BatchQueue:
 
     async def close(self) -> None:
         """The server ends: renders that are not in line yet are made after the next start."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._tasks.close()
 
     def _begin(self, batch: Batch, members: Members | None) -> None:
-        task = asyncio.get_running_loop().create_task(self._feed(batch, members))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._tasks.start("batch", self._feed(batch, members), lambda _: self._give_up(batch))
 
     async def _feed(self, batch: Batch, members: Members | None) -> None:
         """Put its renders in line, in their order, until all of them were, and wait for the last one's end."""
@@ -134,8 +131,14 @@ class BatchQueue:
             self._renders.keep(batch)
         except ServiceError as error:
             log.error("a batch cannot go on", {"id": batch.id[:6], "error": error})
-        except Exception:
-            log.exception("a batch cannot go on")
+            self._give_up(batch)
+
+    def _give_up(self, batch: Batch) -> None:
+        """End it, and those of its renders that are not made yet with it: whoever waits for it learns of that."""
+        batch.cancelled = True
+        self._cancel(batch)
+        if batch.finished.is_set():
+            self._renders.keep(batch)
 
     async def _put_in_line(self, batch: Batch, members: Members | None) -> None:
         missing = [step for step in range(batch.order.renders) if step not in batch.jobs]

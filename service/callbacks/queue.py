@@ -8,11 +8,11 @@ import logging
 import random
 import time
 from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from service.batches.batch import Batch
 from service.callback_hosts import CallbackHosts
@@ -23,6 +23,7 @@ from service.problems import FieldError, InvalidDocument, ServiceError, TooManyR
 from service.renders.job import Job
 from service.storage.callback_rows import Callback, CallbackRows, Kind
 from service.storage.database import Database
+from service.system.background import Background, reported
 from service.system.executors import recording, resolving
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ PAUSES = (5.0, 60.0, 300.0, 1_800.0, 3_600.0, 3 * 3_600.0, 8 * 3_600.0)
 SCATTER = 0.1
 LONGEST_S = 60.0  # between two looks for what is due: clocks jump
 AGAIN_S = 5.0  # after the disk failed
+CALLBACK = "callback"  # what its tasks are called in the log and in /metrics
 GONE = 410  # by Standard Webhooks: the receiver wants no more
 
 log = logging.getLogger(__name__)
@@ -55,7 +57,7 @@ class Callbacks:
         self.outcomes: Counter[str] = Counter()  # of attempts: delivered, retried, failed
         self._pending: Counter[str] = Counter()  # that have not ended, by owner
         self._sending = dict[str, Callback]()  # by id
-        self._tasks = set[asyncio.Task[None]]()
+        self._tasks = Background()
         self._woken = asyncio.Event()
         self._secrets: list[str] = []
         self._tls: ssl.SSLContext | None = None
@@ -86,21 +88,19 @@ class Callbacks:
             return
         for each in waiting:
             try:
-                self._do(self._follow(self._find(each.kind, each.subject, each.owner)))
+                self._tasks.start(CALLBACK, self._follow(self._find(each.kind, each.subject, each.owner)))
             except ServiceError as error:  # it ended, and made room for others before anybody was told
-                self._do(self._end(each, error))
-        self._do(self._run())
+                self._tasks.start(CALLBACK, self._end(each, error))
+        self._tasks.start("sender of callbacks", self._run())
 
     def follow(self, subject: Job | Batch) -> None:
         """Send a callback when it has ended; it is stored already."""
         self._pending[subject.owner] += 1
-        self._do(self._follow(subject))
+        self._tasks.start(CALLBACK, self._follow(subject))
 
     async def close(self) -> None:
         """The server ends: what is not delivered is left for the next one."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._tasks.close()
 
     async def _follow(self, subject: Job | Batch) -> None:
         await subject.finished.wait()
@@ -123,17 +123,15 @@ class Callbacks:
         """Send what is due, a few at a time."""
         while True:
             self._woken.clear()
-            try:
-                if self._tls is None:
-                    self._secrets = await recording(partial(signing.secrets_of, self._config))
-                    self._tls = await resolving(_prepared)
-                pause = await self._begin()
-            except ServiceError as error:
-                log.error("could not send callbacks", {"error": error})
-                pause = AGAIN_S
-            except Exception:
-                log.exception("could not send callbacks")
-                pause = AGAIN_S
+            pause = AGAIN_S
+            with reported("sender of callbacks"):
+                try:
+                    if self._tls is None:
+                        self._secrets = await recording(partial(signing.secrets_of, self._config))
+                        self._tls = await resolving(_prepared)
+                    pause = await self._begin()
+                except ServiceError as error:
+                    log.error("could not send callbacks", {"error": error})
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._woken.wait(), pause)
 
@@ -147,7 +145,7 @@ class Callbacks:
             if found is None or left > 0:
                 return min(left, LONGEST_S)
             self._sending[found.id] = found
-            self._do(self._attempt(found))
+            self._tasks.start(CALLBACK, self._attempt(found), partial(self._try_later, found))
         return LONGEST_S
 
     async def _attempt(self, callback: Callback) -> None:
@@ -169,6 +167,10 @@ class Callbacks:
         await self._stored(partial(self._rows.attempted, self._after(callback, answer, error)))
         del self._sending[callback.id]
         self._woken.set()
+
+    def _try_later(self, callback: Callback, _: Exception) -> None:
+        """An error of the server ended an attempt, of which nothing is stored."""
+        asyncio.get_running_loop().call_later(AGAIN_S, self._sending.pop, callback.id, None)
 
     def _after(self, callback: Callback, answer: int | None, error: str | None) -> Callback:
         """What becomes of a callback by an attempt."""
@@ -196,11 +198,6 @@ class Callbacks:
         self.outcomes["failed"] += 1
         gone = replace(callback, state="failed", ended_at=time.time(), error=error.detail)
         await self._stored(partial(self._rows.attempted, gone))
-
-    def _do(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
 
 
 def _prepared() -> ssl.SSLContext:

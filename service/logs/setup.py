@@ -11,6 +11,7 @@ from types import TracebackType
 
 from service.logs.formatters import Console, Json, context_fields
 from service.logs.output import Output, Queued, Written
+from service.system.background import count_death
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +38,8 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
     # FastAPI silences this one while it reads a route's parameters, by a means that another thread can undo.
     warnings.filterwarnings("ignore", "The 'alias' attribute with value")
     sys.excepthook = _uncaught
-    threading.excepthook = lambda told: _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
+    threading.excepthook = _thread_died
+    sys.unraisablehook = _finalizer_died
 
 
 def always(**fields: str) -> None:
@@ -48,6 +50,17 @@ def always(**fields: str) -> None:
 def level() -> int:
     """The level from which our own loggers write."""
     return logging.getLogger(ROOMS[0]).getEffectiveLevel()
+
+
+def _thread_died(told: threading.ExceptHookArgs) -> None:
+    count_death("thread")
+    _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
+
+
+def _finalizer_died(told: sys.UnraisableHookArgs) -> None:
+    count_death("finalizer")
+    trace = None if told.exc_value is None else (told.exc_type, told.exc_value, told.exc_traceback)
+    log.error("a finalizer died", {"of": repr(told.object)}, exc_info=trace)
 
 
 def _uncaught(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None) -> None:

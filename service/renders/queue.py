@@ -7,10 +7,9 @@ import contextlib
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
 
 from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.renders import listing
@@ -29,6 +28,7 @@ from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRen
 from service.renders.store.rows import REMEMBERED
 from service.renders.store.store import RenderStore
 from service.storage.quota import QuotaUsedUp
+from service.system.background import Background
 
 RETRY_S = 5  # when to ask again where there is no room
 CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
@@ -55,7 +55,7 @@ class RenderQueue:
         self._documents = WaitingDocuments(self._limits.disk_bytes)
         self._kept: KeptRenders[Job | InBatch] = KeptRenders(self._limits.retention)
         self.resting = Resting()
-        self._chores: set[asyncio.Task[None]] = set()
+        self._chores = Background()
         self._timer: asyncio.TimerHandle | None = None
         self.closing = False
 
@@ -234,7 +234,7 @@ class RenderQueue:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_S):
                 await asyncio.gather(*(job.close() for job in self._jobs.values() if not job.finished.is_set()))
-                await asyncio.gather(*self._chores, return_exceptions=True)
+                await self._chores.ended()
 
     async def _stored(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
         """The number that the store gave to the job."""
@@ -288,7 +288,7 @@ class RenderQueue:
         job.cancel()
         self._ended(job)
         if job.recorder is not None:
-            self._do(self._weigh(job))
+            self._chores.start("count of a picture's bytes", self._weigh(job))
 
     async def _weigh(self, job: Job) -> None:
         """Count what is stored of a cancelled render, once it is."""
@@ -338,7 +338,7 @@ class RenderQueue:
             return
         now = time.monotonic()
         if stored := self._drop(self._kept.take_superfluous(now)):
-            self._do(self._forget(stored))
+            self._chores.start("deletion of renders", self._forget(stored))
         # So that room is made also when no more requests come.
         if self._timer is not None:
             self._timer.cancel()
@@ -382,8 +382,3 @@ class RenderQueue:
         self._gone[id] = owner, number
         while len(self._gone) > REMEMBERED:
             self._gone.popitem(last=False)
-
-    def _do(self, work: Coroutine[Any, Any, None]) -> None:
-        chore = asyncio.get_running_loop().create_task(work)
-        self._chores.add(chore)
-        chore.add_done_callback(self._chores.discard)

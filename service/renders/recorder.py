@@ -17,6 +17,7 @@ from service.renderers.protocol import Renderers
 from service.renders.store.pictures import Kind
 from service.renders.store.record import Outcome
 from service.renders.store.store import RenderStore
+from service.system.background import Background
 
 log = logging.getLogger(__name__)
 
@@ -48,6 +49,7 @@ class Recorder:
         self.reached = Progress()  # of the last checkpoint that is on the disk
         self._checkpoint: Restore | None = None  # to be written next ...
         self._came_at = 0.0  # ... and when it came
+        self._tasks = Background()
         self._writing: Writing | None = None
         self._written = asyncio.Event()  # set by the next checkpoint that is on the disk
         self._closed = False
@@ -57,7 +59,7 @@ class Recorder:
         self._checkpoint = Restore(checkpoint.task, 1, checkpoint.saved, None, checkpoint.progress)
         self._came_at = time.monotonic()
         if self._writing is None and not self._closed:
-            self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
+            self._writing = self._tasks.start("checkpoints of a render", self._write_checkpoints(), self._died)
 
     async def store_now(self, take: Callable[[], None], samples: int = 0, patience_s: float | None = None) -> bool:
         """Have a checkpoint on the disk that `take` asks the renderer for, with at least so many samples.
@@ -115,6 +117,11 @@ class Recorder:
         if self._writing is not None:
             with suppress(asyncio.CancelledError):
                 await self._writing
+
+    def _died(self, error: Exception) -> None:
+        """The next checkpoint is written all the same."""
+        self._writing = None
+        self._failed("checkpoint", error)
 
     async def _write_checkpoints(self) -> None:
         while (restore := self._checkpoint) is not None:

@@ -20,7 +20,7 @@ from service.ipc.messages import (
     Restore,
 )
 from service.ipc.task_control import Stop, TakeCheckpoint
-from service.problems import Gone, Internal, ServiceError, Unavailable, answer
+from service.problems import MISTAKE, Gone, Internal, ServiceError, Unavailable, answer
 from service.renderers.protocol import Listener
 from service.renders.life import Tracing
 from service.renders.ordered import Ordered
@@ -28,6 +28,7 @@ from service.renders.recorder import Recorder, Writing
 from service.renders.status import error_of
 from service.renders.store.record import End, Outcome
 from service.renders.viewer import ASK_AGAIN_S, PictureViewer
+from service.system.background import Background, reported
 
 GIVING_WAY_S = 10.0  # for the checkpoint of a render that gives its slot to another one
 
@@ -38,7 +39,7 @@ class Rendering(Listener):
     """For the event loop. It moves the render from one state to the next."""
 
     def __init__(self, render: Ordered, viewer: PictureViewer) -> None:
-        self._render, self._viewer = render, viewer
+        self._render, self._viewer, self._tasks = render, viewer, Background()
         self._least_samples = 0  # of the checkpoint that it goes on from: the renderer may report fewer before that
         self._gives_way = False  # its checkpoint is being stored for that; it may go on
         self._started = False  # this server began it, which is stored
@@ -53,15 +54,24 @@ class Rendering(Listener):
     async def run(self) -> None:
         """See Job."""
         render = self._render
-        try:
-            await self._begin()
-            render.waits = render.waits and render.life.left.is_set()
-        except ServiceError as error:
-            self._could_not_begin(error)
-        except Exception:
-            log.exception("could not begin a render", {"id": render.id[:6]})
-            self._could_not_begin(Internal("The server made a mistake; its log says which."))
+        for died in (self._again, self.died):
+            with reported("beginning of a render", died):
+                try:
+                    await self._begin()
+                    render.waits = render.waits and render.life.left.is_set()
+                except ServiceError as error:
+                    self._could_not_begin(error)
+                break
         await render.life.left.wait()
+
+    def _again(self, error: Exception) -> None:
+        """An error of the server ended the first attempt, of which nothing stays; perhaps it was of that moment."""
+        self.release()
+
+    def died(self, error: Exception) -> None:
+        """An error of the server ended both attempts to begin it, or the task that runs it."""
+        if not self._render.finished.is_set():
+            self._could_not_begin(Internal(MISTAKE))
 
     def _could_not_begin(self, error: ServiceError) -> None:
         render = self._render
@@ -155,7 +165,7 @@ class Rendering(Listener):
             render.renderers.send(Stop(render.task))
         self._end(replace(render.outcome, state="cancelled", ended_at=time.time()))
         if recorder is not None:
-            self._ending = asyncio.create_task(recorder.note(render.outcome))
+            self._ending = self._tasks.start("note of a render's end", recorder.note(render.outcome))
             recorder.whole = render.task is None
 
     async def recorded(self) -> None:
@@ -242,12 +252,18 @@ class Rendering(Listener):
             self._end(outcome)
         else:
             self._saves_picture = done is not None
-            self._ending = asyncio.create_task(self._record_end(recorder, self._ending, outcome, done))
+            record = self._record_end(recorder, self._ending, outcome, done)
+            self._ending = self._tasks.start(
+                "record of a render's end", record, lambda _: self._recorded_end(outcome)
+            )
 
     async def _record_end(self, to: Recorder, before: Writing | None, outcome: Outcome, done: Done | None) -> None:
         if before is not None:
             await before
         await to.end(outcome, done)
+        self._recorded_end(outcome)
+
+    def _recorded_end(self, outcome: Outcome) -> None:
         self._saves_picture = False
         if not self._render.finished.is_set():
             self._end(outcome)

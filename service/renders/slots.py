@@ -12,6 +12,7 @@ from itertools import chain, islice
 from service.renders.job import Job
 from service.renders.preemption import WAIT_S, giving_way
 from service.renders.turns import Turns
+from service.system.background import Background, reported
 
 AGAIN_S = 5.0  # between two attempts to begin a render that waits for memory, the disk or a renderer
 LOOK_S = 1.0  # between two looks at who waits
@@ -41,7 +42,7 @@ class Slots:
         self._claim: Job | None = None  # the one that others are giving way to
         self._leaving: set[Job] = set()  # these others
         self._timer: asyncio.TimerHandle | None = None
-        self._hand_over: asyncio.Task[None] | None = None
+        self._tasks = Background()
 
     @property
     def running(self) -> list[Job]:
@@ -73,8 +74,7 @@ class Slots:
             if job is None:
                 break
             self._start(job)
-        if self._timer is None and len(self.waiting) and not self.closing:
-            self._timer = asyncio.get_running_loop().call_later(LOOK_S, self._look)
+        self._look_later()
 
     @property
     def _free(self) -> int:
@@ -82,11 +82,16 @@ class Slots:
 
     def _look(self) -> None:
         self._timer = None
-        if self._clock() - self._tried_at >= AGAIN_S:
-            self._try_again()
-        self.dispatch()
-        if self._claim is None and not self.closing:
-            self._make_way()
+        with reported("look at who waits", lambda _: self._look_later()):
+            if self._clock() - self._tried_at >= AGAIN_S:
+                self._try_again()
+            self.dispatch()
+            if self._claim is None and not self.closing:
+                self._make_way()
+
+    def _look_later(self) -> None:
+        if self._timer is None and len(self.waiting) and not self.closing:
+            self._timer = asyncio.get_running_loop().call_later(LOOK_S, self._look)
 
     def _try_again(self) -> None:
         for job in list(islice(self._tried, AT_ONCE)):
@@ -96,7 +101,7 @@ class Slots:
     def _start(self, job: Job) -> None:
         self._lacking.pop(job, None)
         self._since.pop(job, None)
-        task = asyncio.get_running_loop().create_task(job.run())
+        task = self._tasks.start("render", job.run(), job.rendering.died)
         self._running[task] = job
         task.add_done_callback(self._ran)
 
@@ -152,7 +157,7 @@ class Slots:
             chosen = giving_way(waiting, running, self._free, waiting.lacks)
             if chosen:
                 self._claim, self._leaving = waiting, set(chosen)
-                self._hand_over = asyncio.get_running_loop().create_task(self._give_way(waiting, chosen))
+                self._tasks.start("hand-over of slots", self._give_way(waiting, chosen), self._gave_up)
                 return
 
     def _firsts(self, owner: str) -> list[Job]:
@@ -169,6 +174,14 @@ class Slots:
                 await asyncio.wait([tasks[job]])
                 log.info("a render gave way to another one", {"id": job.id[:6], "to": waiting.id[:6]})
         await asyncio.sleep(0)  # for `_ran`
+        self._handed_over(waiting)
+
+    def _gave_up(self, error: Exception) -> None:
+        """An error of the server ended the hand-over: whoever gave its slot back by then comes back into line."""
+        if self._claim is not None:
+            self._handed_over(self._claim)
+
+    def _handed_over(self, waiting: Job) -> None:
         left = self._leaving - set(self._running.values())
         self._claim, self._leaving = None, set()
         self._tried.pop(waiting, None)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from service.problems import Unavailable
 from service.renderers.protocol import Member
 from service.renderers.statistics import ClientStatistics, Distribution, Statistics
+from service.system.background import deaths
 from service.system.executors import measuring
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
     yield _counters("leases", help, ("renderer", "outcome"), leases)
     errors = _by_one(clients.errors)
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)
+    yield _counters("background_deaths", "Work that an error of the server ended.", ("what",), _by_one(deaths()))
 
 
 def _clients(state: AppState) -> Iterator[Metric]:

@@ -11,6 +11,7 @@ from service.problems import NotFound, TooManyRequests
 from service.renderers.protocol import Renderers
 from service.requests.request_reader import RequestReader
 from service.streams.stream import Stream
+from service.system.background import Background
 
 ID_BYTES = 32  # 256 bits: an id cannot be guessed
 KEPT_S = 60.0  # of the contract: how long a session waits for its client to come back
@@ -20,13 +21,13 @@ log = logging.getLogger(__name__)
 
 
 class Session:
-    def __init__(self, stream: Stream, owner: str) -> None:
+    def __init__(self, stream: Stream, owner: str, running: asyncio.Task[None]) -> None:
         self.id = secrets.token_hex(ID_BYTES)
         self.owner = owner  # the owner of the key that opened it
         self.stream = stream
         self.connections = 0  # at present; two while one replaces the other
         self.beside: Session | None = None  # whose second variant this is: a client's two count as one
-        self.running = asyncio.create_task(stream.run())
+        self.running = running
         self.timer: asyncio.TimerHandle | None = None
 
 
@@ -37,6 +38,7 @@ class Sessions:
         self._renderers = renderers
         self._reader = reader
         self._most = most
+        self._running = Background()
         self._kept: dict[str, Session] = {}  # the longest left first, among those that are left
 
     @property
@@ -70,7 +72,8 @@ class Sessions:
         if (session is None or not session.connections) and not is_second:
             self._admit(owner)
         if session is None:
-            session = Session(Stream(self._renderers, self._reader, owner), owner)
+            stream = Stream(self._renderers, self._reader, owner)
+            session = Session(stream, owner, self._running.start("stream", stream.run(), stream.died))
             session.beside = first
             self._kept[session.id] = session
         if session.timer is not None:

@@ -20,7 +20,7 @@ from service.ipc.messages import (
     Update,
 )
 from service.ipc.task_control import Hold, Pause, Resume, Stop
-from service.problems import Conflict, Internal, MalformedJson, ServiceError, answer, problem
+from service.problems import MISTAKE, Conflict, Internal, MalformedJson, ServiceError, answer, problem
 from service.renderers.protocol import Renderers
 from service.renders.status import error_of
 from service.requests.request_reader import RequestReader
@@ -207,6 +207,10 @@ class Stream:
     def lost(self, detail: str) -> None:
         self._refuse(Internal(detail), self._flow.generation)
         self.end(LOST, detail)
+
+    def died(self, error: Exception) -> None:
+        """The task that runs it was ended by an error of the server."""
+        self.lost(MISTAKE)
 
     async def _handle_all(self) -> None:
         while True:

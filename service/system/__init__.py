@@ -10,6 +10,7 @@ shares           what each caller has of something that all of them share
 turns            whom the work at hand is for, and turns that go round these callers
 garbage          the garbage collector, out of the way of large imports
 disk_usage       what files take on a disk: blocks and inodes
+background       tasks that nobody awaits, none of which dies unseen
 executors        the threads of the server's slow work
 priority         niceness of threads and processes
 """

@@ -92,8 +92,8 @@ def test_a_render_lies_on_the_picture_and_a_link_keeps_it(editor: Editor, server
     assert side(editor, "Left").input_value() == "a" and side(editor, "Right").input_value() == f"render {id}"
     assert page.is_hidden("#editing") and page.is_hidden("#comparison >> text=Discard B"), "B is not to be seen"
     editor.wait("its pixels", lambda: half(editor, "right").max() > 0)
-    # The picture begins again at the size that the sheet leaves it: until then it has samples, and lies elsewhere; and
-    # each half takes the new size as it is drawn.
+    # The picture begins again at the size that the sheet leaves it: until then it has samples, and lies elsewhere.
+    # Each half takes the new size as it is drawn.
     editor.wait("one size", lambda: half(editor, "left").shape == half(editor, "right").shape)
     editor.wait("both alike", lambda: np.abs(coarse(half(editor, "left")) - coarse(half(editor, "right"))).max() < 6)
 

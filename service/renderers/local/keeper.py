@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 import time
+from collections.abc import Coroutine
 from typing import Any, Protocol
 
 from service.ipc import channel
@@ -15,9 +16,11 @@ from service.renderers.local.process import Cause, RendererProcess, Start, Waiti
 from service.renderers.local.restarts import Restarts
 from service.renderers.protocol import State
 from service.renderers.statistics import Statistics
+from service.system.background import Background, Died, reported
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 WATCH_S = 0.5
+AGAIN_S = 5.0  # between two attempts to start a process where the system refuses it
 FAREWELL_S = 3.0  # for the renderer to end by itself; one slice on a slow machine, or a compilation
 STARTING = "The renderer is starting."
 CLOSING = "The server is shutting down."
@@ -60,7 +63,7 @@ class Keeper:
         self._id, self._begin_process, self._patience_s, self._statistics = id, start, patience_s, statistics
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._lost_at: float | None = None
-        self._chores: set[asyncio.Task[None]] = set()
+        self._chores = Background()
         self._draining = self._closed = False
         self._lifeline: tuple[int, int] | None = None  # a pipe: what outlives a renderer ends with its other end
 
@@ -69,7 +72,7 @@ class Keeper:
             self._ready = asyncio.get_running_loop().create_future()
             self._lifeline = os.pipe()
             self._begin()
-            self.do(self._watch())
+            self.do("watchdog", self._watch())
 
     def drain(self) -> None:
         self._draining, self.detail = True, CLOSING
@@ -78,9 +81,7 @@ class Keeper:
         """End all chores; what is lost from now on is not replaced."""
         self.drain()
         self._closed = True
-        for chore in self._chores:
-            chore.cancel()
-        await asyncio.gather(*self._chores, return_exceptions=True)
+        await self._chores.close()
 
     async def end(self) -> None:
         """End the process, after `stop`."""
@@ -129,11 +130,9 @@ class Keeper:
         else:
             channel.discard(encoded)
 
-    def do(self, work: Any) -> None:
-        """Run a coroutine, which `stop` cancels."""
-        chore = asyncio.get_running_loop().create_task(work)
-        self._chores.add(chore)
-        chore.add_done_callback(self._chores.discard)
+    def do(self, what: str, work: Coroutine[Any, Any, None], died: Died | None = None) -> None:
+        """Run a coroutine, which `stop` cancels; see Background."""
+        self._chores.start(what, work, died)
 
     def _begin(self) -> None:
         lifeline = None if self._lifeline is None else self._lifeline[0]
@@ -181,7 +180,8 @@ class Keeper:
             await asyncio.sleep(pause_s)
             late = loop.time() - began > 2 * pause_s  # then it is the server that was slow, and has not listened
             if self.process is not None:
-                self.process.watch(excused=late)
+                with reported("watchdog"):
+                    self.process.watch(excused=late)
 
     def _lose(self, process: RendererProcess) -> None:
         """Replace a renderer whose end of the channel is closed."""
@@ -194,7 +194,17 @@ class Keeper:
                 self.detail = "The renderer was lost."
             self._ready = asyncio.get_running_loop().create_future()
         self._events.changed()
-        self.do(self._replace(process))
+        self.do("replacement of a renderer", self._replace(process), self._begin_later)
+
+    def _begin_later(self, _: Exception) -> None:
+        """An error of the server ended a replacement, or no process could be started."""
+        if not self._closed:
+            asyncio.get_running_loop().call_later(AGAIN_S, self._begin_if_lost)
+
+    def _begin_if_lost(self) -> None:
+        if not self._closed and self.process is None:
+            with reported("replacement of a renderer", self._begin_later):
+                self._begin()
 
     async def _replace(self, process: RendererProcess) -> None:
         cause = await process.end(LAST_WORDS_S)

@@ -162,7 +162,7 @@ class Supervisor:
         if task.resident:
             self._keeper.send(message)
         elif isinstance(message, Read):
-            self._keeper.do(self._tasks.bring_back(message.task, task))
+            self._tasks.bring_back_soon(message.task, task)
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
         """Like `send`, for a whole scene or a large edit: copying that to shared memory is not the event loop's work.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from functools import partial
 from typing import Protocol
 
 from service.ipc import channel
@@ -22,12 +23,14 @@ from service.ipc.messages import (
     Usage,
 )
 from service.ipc.task_control import Drop
+from service.problems import MISTAKE
 from service.renderers.local.keeper import Keeper
 from service.renderers.local.process import Cause, RendererProcess, Start
 from service.renderers.local.restarts import BY_OTHERS
 from service.renderers.replay_log import ReplayLog
 from service.renderers.statistics import Kind, Statistics
 from service.renderers.task import Task
+from service.system.background import reported
 from service.system.executors import tending
 
 STRIKES = 3  # renderers that a task may bring down
@@ -117,6 +120,12 @@ class Tasks:
         for task in tasks.values():
             task.listener.lost(detail)
 
+    def bring_back_soon(self, number: int, task: Task) -> None:
+        """Begin to bring back a picture; where that fails, what was under way begins again."""
+        self.keeper.do(
+            "return of a picture", self.bring_back(number, task), partial(self._lose_picture, number, task)
+        )
+
     async def bring_back(self, number: int, task: Task) -> None:
         """Send the process a picture that it does not have, to go on with it or to read it."""
         process, kept = self.keeper.process, task.record.kept
@@ -142,7 +151,8 @@ class Tasks:
         elif isinstance(message, Lease | LeaseDone | LeaseFailed | LeaseRefuted):
             self._events.leased(message)
         elif (task := self.by_number.get(message.task)) is not None:
-            self._hear(message, task)
+            with reported("message of a renderer", lambda _: self._lose_task(message.task)):
+                self._hear(message, task)
 
     def lost(self, process: RendererProcess, cause: Cause) -> None:
         self._blame(process, cause)
@@ -158,7 +168,7 @@ class Tasks:
             self._replay(number, task.record)
             task.listener.again()
         elif task.record.saved is None or task.record.reads:
-            self.keeper.do(self.bring_back(number, task))
+            self.bring_back_soon(number, task)
 
     def _replay(self, number: int, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
         for message in record.again(kept):
@@ -181,6 +191,12 @@ class Tasks:
         task.resident = True
         self._replay(number, task.record)
         task.listener.again()
+
+    def _lose_task(self, number: int) -> None:
+        """An error of the server keeps a message from whom it is for, whom nothing reaches any more in order."""
+        if (task := self.forget(number)) is not None:
+            self.keeper.send(Drop(number))
+            task.listener.lost(MISTAKE)
 
     def _hear(self, message: Heard, task: Task) -> None:
         if isinstance(message, Evicted):
@@ -206,7 +222,7 @@ class Tasks:
             for read in list(task.record.reads.values()):
                 task.listener.heard(task.record.heard(Image(number, read.serial, None, Progress())))
         elif task.record.reads:
-            self.keeper.do(self.bring_back(number, task))
+            self.bring_back_soon(number, task)
 
     def _account(self, usage: Usage) -> None:
         statistics = self._statistics

@@ -16,6 +16,7 @@ from service.renderers.local.process import Options, Process
 from service.renderers.pool.devices import listed, of_cuda
 from service.renderers.ray.code import version
 from service.renderers.ray.control import Ended
+from service.system.background import Background, reported
 from service.system.memory import MemoryBudget
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
@@ -32,7 +33,7 @@ class Renderer:
         self._outgoing: deque[FromRenderer | Ended] = deque()
         self._news = asyncio.Event()
         self._paused = False
-        self._chores: set[asyncio.Task[None]] = set()
+        self._chores = Background()
         self._lifeline: tuple[int, int] | None = None  # a pipe: what outlives a renderer ends with its other end
 
     async def describe(self) -> dict[str, str]:
@@ -53,7 +54,7 @@ class Renderer:
             given, lambda message: self._received(process, message), lambda: self._lose(process), self._lifeline[0]
         )
         self._process = process
-        self._do(self._watch(process, min(WATCH_S, given.patience_s / 4)))
+        self._chores.start("watchdog", self._watch(process, min(WATCH_S, given.patience_s / 4)))
 
     async def take(self, messages: list[ToRenderer]) -> None:
         """Pass small messages on, in order."""
@@ -108,7 +109,7 @@ class Renderer:
     def _lose(self, process: Process) -> None:
         if process is self._process:
             self._process = None
-            self._do(self._bury(process, self._outgoing, self._news))
+            self._chores.start("end of a renderer", self._bury(process, self._outgoing, self._news))
 
     async def _bury(self, process: Process, outgoing: deque[FromRenderer | Ended], news: asyncio.Event) -> None:
         cause = await process.end(LAST_WORDS_S)
@@ -122,12 +123,8 @@ class Renderer:
             await asyncio.sleep(pause_s)
             if process is self._process:
                 # A renderer whose messages are not fetched waits, and is not at fault.
-                process.watch(excused=self._paused or loop.time() - began > 2 * pause_s)
-
-    def _do(self, work: Any) -> None:
-        chore = asyncio.get_running_loop().create_task(work)
-        self._chores.add(chore)
-        chore.add_done_callback(self._chores.discard)
+                with reported("watchdog"):
+                    process.watch(excused=self._paused or loop.time() - began > 2 * pause_s)
 
 
 def _gpu() -> int | None:

@@ -28,6 +28,7 @@ from service.renderers.ray.control import Alive, Join, Joined, Open, Refused, Re
 from service.renderers.ray.joining import CannotJoin, close_token_file, has_token, join, survey
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described
+from service.system.background import Background
 
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
@@ -58,10 +59,11 @@ class Gateway:
         """Return when the server is gone, or has closed its socket."""
         loop = asyncio.get_running_loop()
         loop.add_reader(self._end, self._readable)
-        chores = [asyncio.ensure_future(work) for work in (self._watch_drains(), self._say_alive())]
+        chores = Background()
+        chores.start("watch for nodes that are drained", self._watch_drains())
+        chores.start("signs of life", self._say_alive())
         await self._over.wait()
-        for chore in chores:
-            chore.cancel()
+        await chores.close()
         for lane in self._lanes.values():
             lane.close()
         if self._lanes:

@@ -9,15 +9,18 @@ import socket
 from collections import deque
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 from service.ipc import channel
-from service.ipc.messages import FromRenderer, ToRenderer, Unable, Update
+from service.ipc.messages import Failed, FromRenderer, ToRenderer, Unable, Update
 from service.ipc.task_control import Drop, TakeCheckpoint
+from service.problems import MISTAKE
 from service.renderers.local.process import Waiting
 from service.renderers.ray.carriage import LARGE, Scenes, size, stored
 from service.renderers.ray.code import difference
 from service.renderers.ray.control import Ended
+from service.system.background import Background
 
 SILENCE_S = 30.0  # without an answer from an actor, which gives one every 5 s, until it is given up
 PLACING_S = 4.0  # that Ray may take to place an actor before the reason is asked for; then between two times
@@ -63,7 +66,7 @@ class Lane:
         self._paused = False
         self._loss = "node lost"  # why, when the actor is lost
         self._over = asyncio.Event()  # the supervisor has closed its end
-        self._carrying: set[asyncio.Task[None]] = set()
+        self._carrying = Background()
         self._link = channel.Channel(end, self._received, self._over.set)
 
     async def run(self) -> None:
@@ -75,10 +78,9 @@ class Lane:
                 self._link.send(work.result())
                 await self._flush()
         finally:
-            chores = (work, over, *self._carrying)
-            for task in chores:
+            for task in (work, over):
                 task.cancel()
-            await asyncio.gather(*chores, return_exceptions=True)
+            await asyncio.gather(work, over, self._carrying.close(), return_exceptions=True)
             self._link.close()
             self._actors.scenes.forget_all(self)
 
@@ -189,9 +191,16 @@ class Lane:
                 self._note(together)
                 await _answer(actor.take.remote(together))
             for message in large:
-                carrying = asyncio.ensure_future(self._carry(actor, message))
-                self._carrying.add(carrying)
-                carrying.add_done_callback(self._carrying.discard)
+                self._carrying.start(
+                    "large message", self._carry(actor, message), partial(self._not_carried, message)
+                )
+
+    def _not_carried(self, message: ToRenderer, _: Exception) -> None:
+        """An error of the server kept a large message from the renderer; what waits behind it goes on."""
+        if isinstance(message, Update):
+            self._link.send(Failed(message.task, message.generation, MISTAKE))
+        self._incoming.extendleft(reversed(self._held.pop(message.task, [])))
+        self._news.set()
 
     def _note(self, messages: list[ToRenderer]) -> None:
         for message in messages:
@@ -201,7 +210,9 @@ class Lane:
 
     async def _carry(self, actor: Any, message: ToRenderer) -> None:
         """Pass a large message on, and then let those go on that wait behind it."""
-        with suppress(Exception):  # the actor is lost, which `_hear_all` is told too
+        from ray.exceptions import RayError
+
+        with suppress(RayError):  # the actor is lost, which `_hear_all` is told too
             if isinstance(message, Update) and message.scene is not None:
                 self._tasks.add(message.task)
                 scene = await self._actors.scenes.put((self, message.task), message.scene)

@@ -10,6 +10,7 @@ from service.renderers.local.process import Options
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
 from service.renderers.ray.cluster import Cluster
+from service.system.background import Background, reported
 
 LOOK_S = 1.0  # between two looks at how much work there is
 LONG_S = 10.0  # of work, after which all renderers are asked for: they divide it
@@ -28,6 +29,7 @@ class ClusterPool(Pool):
         self._count = cluster.joined.renderers
         self._busy_since: float | None = None
         self._idle_since = time.monotonic()
+        self._chores = Background()
         self._looking: asyncio.Task[None] | None = None
         options = Options(patience_s=cluster.options["patience_s"])
         super().__init__(
@@ -39,7 +41,7 @@ class ClusterPool(Pool):
     def start(self) -> None:
         super().start()
         if self._looking is None:
-            self._looking = asyncio.get_running_loop().create_task(self._look())
+            self._looking = self._chores.start("look at the cluster's load", self._look())
 
     async def close(self) -> None:
         if self._looking is not None:
@@ -50,7 +52,8 @@ class ClusterPool(Pool):
     async def _look(self) -> None:
         while True:
             await asyncio.sleep(LOOK_S)
-            self.settle(time.monotonic())
+            with reported("look at the cluster's load"):
+                self.settle(time.monotonic())
 
     def settle(self, now: float) -> None:
         """Ask the cluster for as many renderers as there are tasks; for all when work lasts, for one after none."""

@@ -100,6 +100,7 @@ class Fake:
         self.elapsed_s, self.memory_share, self.began, self.fits = 0.0, 0.0, False, True
         self.lasting = self.can_give_way = True
         self.finished, self.leaves = asyncio.Event(), asyncio.Event()
+        self.rendering = self
         vars(self).update(more)
 
     def reserve(self) -> bool:
@@ -111,6 +112,9 @@ class Fake:
         await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
         for wait in waits:
             wait.cancel()
+
+    def died(self, error: Exception) -> None:
+        self.finished.set()
 
     async def give_way(self) -> bool:
         self.began = True
