@@ -13,7 +13,8 @@ import tempfile
 import weakref
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Hashable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -181,4 +182,11 @@ class Downloads:
         if key is not None:
             self._written[key] = written
         self._shares.count(caller, written.bytes)
-        weakref.finalize(written, self._shares.release, caller, written.bytes)
+        release = partial(self._shares.release, caller, written.bytes)
+        weakref.finalize(written, _call_in, asyncio.get_running_loop(), release)
+
+
+def _call_in(loop: asyncio.AbstractEventLoop, work: Callable[[], None]) -> None:
+    """Have the loop do it: a finalizer runs in whichever thread drops the last reference, and in between anything."""
+    with suppress(RuntimeError):  # the loop is closed
+        loop.call_soon_threadsafe(work)

@@ -54,10 +54,10 @@ class PackCache:
         self.bytes = 0
         self._entries = entries
         self._budget = budget or CacheBudget()
-        self._budget.join(self)
         self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
         self.moves = MovedMeshes()
+        self._budget.join(self)  # last: from now on other threads shrink it
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The part of an equal key, or else `make()`, which runs outside the lock."""
