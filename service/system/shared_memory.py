@@ -6,6 +6,7 @@ import ctypes
 import math
 import mmap
 import os
+import threading
 import weakref
 from contextlib import suppress
 from typing import Any
@@ -26,6 +27,9 @@ class Block(mmap.mmap):
 # By address. A plain dict, as its `copy` is one step of the interpreter: blocks come and go in other threads, and a
 # WeakValueDictionary that is listed meanwhile raises RuntimeError.
 _blocks: dict[int, weakref.ref[Block]] = {}
+# Of changes. An mmap is unmapped before its weak references are called [CPython, mmapmodule.c], and another thread
+# may map a new block there in between. Reentrant, as the collector may drop a block in between, too.
+_changing = threading.RLock()
 
 
 def block(size: int) -> Block:
@@ -47,10 +51,12 @@ def _register(made: Block) -> None:
     address = _address(np.frombuffer(made, np.uint8))
 
     def forget(dead: weakref.ref[Block]) -> None:
-        if _blocks.get(address) is dead:  # else a new block has the address by now
-            del _blocks[address]
+        with _changing:
+            if _blocks.get(address) is dead:  # else a new block has the address by now
+                del _blocks[address]
 
-    _blocks[address] = weakref.ref(made, forget)
+    with _changing:
+        _blocks[address] = weakref.ref(made, forget)
 
 
 def locate(part: memoryview) -> tuple[Block, int] | None:

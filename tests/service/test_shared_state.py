@@ -48,7 +48,7 @@ CHANGED = {
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",
-    "system/shared_memory.py _blocks": "listed by `copy`, which is one step of the interpreter",
+    "system/shared_memory.py _blocks": "a lock for changes; listed by `copy`, which is one step of the interpreter",
     "worker/view/view_tables.py _baked": "of the renderer's thread",
 }
 # Classes for any thread that have no lock, and why they need none.
