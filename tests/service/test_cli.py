@@ -194,9 +194,9 @@ def test_time_limit_is_kept_and_ends_between_samples(
     for module in (passes, stop_rules):
         monkeypatch.setattr(module, "time", clock)
 
-    def rendered(name: str, limit: str) -> tuple[dict[str, Any], bytes]:
+    def rendered(name: str, limit: str, pixels: int = 64) -> tuple[dict[str, Any], bytes]:
         out, stats = tmp_path / f"{name}.npy", tmp_path / f"{name}.json"
-        size = ["--set", "width=64", "--set", "height=64", "--set", limit]
+        size = ["--set", f"width={pixels}", "--set", f"height={pixels}", "--set", limit]
         assert main(["render", str(scene), "-o", str(out), "--stats", str(stats), *size]) == 0
         return json.loads(stats.read_text()), out.read_bytes()
 
@@ -205,6 +205,9 @@ def test_time_limit_is_kept_and_ends_between_samples(
     # A picture may end up to a sample before the limit; the contract allows a tenth of it and 0.1 s after it.
     assert 0.9 * limit_s <= told["elapsed_s"] <= 1.1 * limit_s + 0.1 and told["samples"] > 1
     assert rendered("by-samples", f"max_samples={told['samples']}")[1] == picture
+    told, _ = rendered("first", "time_limit=0.001", 300)
+    assert (told["reason"], told["samples"]) == ("time_limit", 1)
+    assert told["elapsed_s"] == pytest.approx(0.09, rel=0.2)
 
 
 def test_target_noise_ends_a_render(gpu: Any, scene: Path, tmp_path: Path) -> None:

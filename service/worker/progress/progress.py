@@ -67,8 +67,9 @@ class ProgressTracker:
         reason = reached(self.stop, full.samples, noise)
         if full.under_way[0]:  # the pass is finished first, so that as many samples give the same picture
             reason = None
-        if reason is None and late(self.stop, self.clock.now_s, self._sample_s(residency), self.even):
-            reason = "time_limit"
+        if full.samples and reason is None:  # a picture has its first sample, whatever that takes
+            is_late = late(self.stop, self.clock.now_s, self._sample_s(residency), self.even)
+            reason = "time_limit" if is_late else None
         return reason
 
     def _sample_s(self, residency: Residency) -> float:
