@@ -18,6 +18,29 @@ HIDE = """(hidden) => {
 }"""
 
 
+# The last frame comes once more, as one of the generation before: it was on its way while an update went out.
+LATE = """() => {
+    const { socket, frame } = window.heard;
+    const length = new DataView(frame).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)));
+    const text = new TextEncoder().encode(JSON.stringify({ ...header, generation: header.generation - 1 }));
+    const late = new Uint8Array(4 + text.length + frame.byteLength - 4 - length);
+    new DataView(late.buffer).setUint32(0, text.length, true);
+    late.set(text, 4);
+    late.set(new Uint8Array(frame, 4 + length), 4 + text.length);
+    socket.dispatchEvent(new MessageEvent("message", { data: late.buffer }));
+    return header.seq;
+}"""
+LISTEN = """window.WebSocket = class extends WebSocket {
+    constructor(...given) {
+        super(...given);
+        this.addEventListener("message", ({ data }) => {
+            if (data instanceof ArrayBuffer) window.heard = { socket: this, frame: data };
+        });
+    }
+};"""
+
+
 class Wire:
     def __init__(self, editor: Editor) -> None:
         self.said: list[dict[str, Any]] = []
@@ -40,6 +63,7 @@ class Wire:
 @pytest.fixture
 def wire(server: Server, blank: Editor) -> tuple[Editor, Wire]:
     wire = Wire(blank)
+    blank.page.add_init_script(LISTEN)
     blank.open(server.url)
     return blank, wire
 
@@ -79,6 +103,9 @@ def test_every_frame_is_acknowledged(wire: tuple[Editor, Wire]) -> None:
     editor.rest("the last acknowledgement", lambda: (len(heard.frames), len(heard.said)))
     acknowledged = [message["seq"] for message in heard.said if message["type"] == "ack"]
     assert sorted(acknowledged) == [frame["seq"] for frame in heard.frames]
+    late = editor.page.evaluate(LATE)
+    editor.wait("its acknowledgement", lambda: [m["seq"] for m in heard.said if m["type"] == "ack"].count(late) == 2)
+    assert editor.text("#state") == "Paused"
 
 
 def test_a_hidden_page_pauses(wire: tuple[Editor, Wire]) -> None:
