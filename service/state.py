@@ -126,8 +126,11 @@ class AppState:
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A new render. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
-        waiting = self.render_queue.packed
-        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
+        return self._job(order, document, packed, outcome)
+
+    def _job(self, order: Order, document: bytes | None, packed: Packed | None, outcome: Outcome) -> Job:
+        load = partial(self._pack, order.owner)
+        return Job(self.renderers, order, load, document, packed, outcome, self.memory, self.render_queue.packed)
 
     def _members(self, batch: Batch, body: bytes) -> Members:
         return Members(batch, body, self.reader, self._member)
@@ -135,25 +138,25 @@ class AppState:
     def _member(self, order: Order, document: bytes | None, packed: Packed | None) -> Job:
         """A new render of a batch. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(warnings=list(packed.warnings) if packed is not None else [])
-        waiting = self.render_queue.packed
-        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
+        return self._job(order, document, packed, outcome)
 
     def _told_of(self, kind: CallbackKind, id: str, owner: str) -> Job | Batch:
         """Whose end a callback is about. Raises NotFound, Gone."""
         return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
     def _resumed(self, stored: StoredRender) -> Job:
-        return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
+        load = partial(self._pack, stored.order.owner)
+        return Job(self.renderers, stored.order, load, outcome=stored.outcome, budget=self.memory)
 
-    async def _pack(self, document: bytes, count: Callable[[int], None]) -> Packed:
-        """The packed scene of a folded document, which was valid, and whose owner was allowed to use its assets, when
-        it was stored. Raises what reading it raises.
+    async def _pack(self, owner: str, document: bytes, count: Callable[[int], None]) -> Packed:
+        """The packed scene of an owner's folded document, which was valid when it was stored. Raises what reading it
+        raises.
 
         `count` is called with the bytes of memory that parsing takes, before parsing begins."""
         body = await packing(lambda: bytearray(unfolded(document), "ascii"))
         count(await packing(partial(self.bodies.memory_for, body)))
         scene: Scene = await self.bodies.parsed("scene", body, counted=True)
-        return await packing(partial(self.reader.pack, scene))
+        return await packing(partial(self.reader.pack, scene, owner=owner))
 
     async def gpu_missing(self) -> str | None:
         """The reason why SUNBOX_REQUIRE_GPU forbids to start, or None. Waits for the renderer."""

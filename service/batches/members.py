@@ -56,7 +56,7 @@ class Members:
         document = self._variations.document(0)
         scene = self._reader.scene(document["scene"])
         self._before = Parsed(document["scene"], scene)
-        self._reader.pack(scene, self._cache, self._batch.owner)
+        self._reader.pack(scene, self._cache, owner=self._batch.owner)
 
     def _packed(self, step: int) -> tuple[dict[str, Any], ResolvedSettings, Packed | None]:
         document, settings = self._variations.document(step), resolve(Settings())
@@ -64,6 +64,6 @@ class Members:
             settings = self._reader.settings(document["settings"])
             scene = self._reader.scene(document["scene"], self._before)
             self._before = Parsed(document["scene"], scene)
-            return document, settings, self._reader.pack(scene, self._cache, self._batch.owner)
+            return document, settings, self._reader.pack(scene, self._cache, owner=self._batch.owner)
         except (InvalidDocument, ServiceError):
             return document, settings, None

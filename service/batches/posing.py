@@ -20,6 +20,7 @@ from service.problems import FieldError, InvalidDocument, NotFound, TooLarge
 from service.requests.batch_request import ParsedBatch, times_of
 from service.requests.request_parser import unfolded
 from service.scene.axes import Times
+from service.scene.references import references
 from service.storage.stores import Storage
 
 MEMBERS = {"shapes": ("asset", "transform"), "lights": ("position", "direction")}  # that a pose sets
@@ -38,15 +39,16 @@ def with_poses(parsed: ParsedBatch, storage: Storage, owner: str) -> ParsedBatch
     if not moved:
         return parsed
     scene, axes = json.loads(unfolded(parsed.body))["scene"], json.loads(parsed.axes)
-    assets = dict.fromkeys(parsed.assets)
+    uses = list(parsed.uses)
     for i, axis in moved.items():
-        axes[i]["poses"] = _poses(axis, f"/over/{i}", scene, assets, storage, owner)
-    return replace(parsed, axes=json.dumps(axes), assets=list(assets))
+        axes[i]["poses"] = poses = _poses(axis, f"/over/{i}", scene, storage, owner)
+        uses += [
+            (f"/over/{i}{axis.pointer(step)}", ref) for step, pose in enumerate(poses) for ref in references(pose)
+        ]
+    return replace(parsed, axes=json.dumps(axes), uses=uses)
 
 
-def _poses(
-    axis: Times, pointer: str, scene: Any, assets: dict[str, None], storage: Storage, owner: str
-) -> list[dict[str, dict[str, Thing]]]:
+def _poses(axis: Times, pointer: str, scene: Any, storage: Storage, owner: str) -> list[dict[str, dict[str, Thing]]]:
     store, room = storage.assets, partial(storage.shares.room, owner)
     try:
         storage.access.check(owner, axis.asset)
@@ -64,7 +66,6 @@ def _poses(
         except NotFound as error:
             raise NotFound(error.detail, pointer + error.pointer) from None
         storage.shares.imported(owner, axis.asset, posed.references())
-        assets |= dict.fromkeys(posed.references())
         pose = {
             kind: _moved(scene[kind], here[kind], posed.document.get(kind, ()), kind)
             for kind in MEMBERS

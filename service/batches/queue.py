@@ -15,6 +15,7 @@ from service.renders.job import Job
 from service.renders.queue import RETRY_S, RenderQueue
 from service.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.renders.store.record import IdempotencyKey
+from service.storage.asset_access import AllowedUses
 from service.system.background import Background
 from service.system.executors import parsing, recording
 
@@ -33,9 +34,7 @@ class BatchQueue:
         self._batches: dict[str, Batch] = {}  # in the order of arrival
         self._tasks = Background()
 
-    async def submit(
-        self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
-    ) -> Batch:
+    async def submit(self, order: BatchOrder, body: bytes, uses: AllowedUses, key: IdempotencyKey | None) -> Batch:
         """Store a batch and begin it. Raises what packing its first scene raises; TooManyRequests, Unavailable."""
         self.admit(order.owner)
         batch = Batch(order)

@@ -50,7 +50,7 @@ class Readiness:
         """Raises Unavailable if no picture can be rendered, or a wrong one is."""
         try:
             if self._packed is None:
-                self._packed = await packing(lambda: self._reader.pack(self._reader.scene(SCENE)))
+                self._packed = await packing(lambda: self._reader.pack(self._reader.scene(SCENE), owner=""))
             settings = self._reader.settings(SETTINGS).for_gpu()
         except ServiceError as error:
             raise Unavailable(f"Nothing can be rendered: {error}") from None

@@ -82,7 +82,7 @@ async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterab
 
 
 def _packed(reader: RequestReader, document: Any) -> Packed:
-    return reader.pack(reader.scene(document))
+    return reader.pack(reader.scene(document), owner="")
 
 
 class _Deaf:

@@ -27,6 +27,7 @@ from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.renders.store.rows import REMEMBERED
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.quota import QuotaUsedUp
 from service.system.background import Background
 
@@ -97,7 +98,7 @@ class RenderQueue:
         self._slots.dispatch()
 
     async def submit(
-        self, job: Job, uses: Collection[str] = (), key: IdempotencyKey | None = None, listed: bool = True
+        self, job: Job, uses: AllowedUses = NO_USES, key: IdempotencyKey | None = None, listed: bool = True
     ) -> None:
         """Queue a job, which runs when its turn comes; it is stored first where that is possible.
 
@@ -236,7 +237,7 @@ class RenderQueue:
                 await asyncio.gather(*(job.close() for job in self._jobs.values() if not job.finished.is_set()))
                 await self._chores.ended()
 
-    async def _stored(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+    async def _stored(self, job: Job, uses: AllowedUses, key: IdempotencyKey | None) -> int:
         """The number that the store gave to the job."""
         self._documents.take(job, job.order.bytes)
         self._storing[job.owner] += 1
@@ -248,7 +249,7 @@ class RenderQueue:
         finally:
             self._storing[job.owner] -= 1
 
-    async def _insert(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+    async def _insert(self, job: Job, uses: AllowedUses, key: IdempotencyKey | None) -> int:
         """Where there is no room, ended renders make some, and at last there is a reserve for owners of few bytes."""
         assert self.store is not None
         scene = job.scene
@@ -303,7 +304,7 @@ class RenderQueue:
         self._evict()
 
     async def store_batch(
-        self, batch: InBatch, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
+        self, batch: InBatch, order: BatchOrder, body: bytes, uses: AllowedUses, key: IdempotencyKey | None
     ) -> int:
         """The number of a batch in the store. Raises Unavailable, TooManyRequests."""
         if self.store is None:

@@ -37,7 +37,7 @@ class ParsedBatch:
     body: bytes
     axes: str  # JSON
     renders: int
-    assets: list[str]  # that its scenes refer to
+    uses: list[tuple[str, str]]  # JSON pointers of assets, in the scene or at the step that names them, and their ids
     label: str | None
     priority: int
     digest: str  # of the body as parsed JSON
@@ -54,12 +54,13 @@ def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
     if len(variations) > config.max_batch:
         detail = f"makes {len(variations)} renders: no more than {config.max_batch} are allowed (SUNBOX_MAX_BATCH)"
         raise InvalidDocument([FieldError("/over", detail)])
-    assets = dict.fromkeys(_checked(RequestParser(config), variations))
+    _check(RequestParser(config), variations)
     axes = _AXES.dump_json(request.over, exclude_unset=True).decode()
     digest = digest_of(document)
     return ParsedBatch(
-        folded(base), axes, len(variations), list(assets), request.label, request.priority, digest, request.callback
-    )
+        folded(base), axes, len(variations), list(_uses(variations)), request.label, request.priority, digest,
+        request.callback,
+    )  # fmt: skip
 
 
 def variations(base: Any, axes: str) -> Variations:
@@ -82,8 +83,19 @@ def document_of_step(body: bytes, axes: str, step: int) -> bytes:
     return folded(variations(json.loads(unfolded(body)), axes).document(step)["scene"])
 
 
-def _checked(parser: RequestParser, variations: Variations) -> Iterator[str]:
-    """The assets of every step; of each scene only what differs from the first one's is validated."""
+def _uses(variations: Variations) -> Iterator[tuple[str, str]]:
+    """The assets of all renders' scenes, each of which stands in the base or in what one step writes."""
+    for pointer, ref in references.pointed(variations.base["scene"]):
+        yield f"/scene{pointer}", ref
+    for i, axis in enumerate(variations.axes):
+        for step in range(len(axis)):
+            for ref in references.references(axis.written(step)):
+                yield f"/over/{i}{axis.pointer(step)}", ref
+
+
+def _check(parser: RequestParser, variations: Variations) -> None:
+    """Raise InvalidDocument for a step that is not valid; of each scene only what differs from the first one's is
+    validated."""
     first = _first(variations)
     try:
         scene, _ = parser.both(first["scene"], first["settings"])
@@ -97,7 +109,6 @@ def _checked(parser: RequestParser, variations: Variations) -> Iterator[str]:
                 parser.settings(document["settings"])
         except InvalidDocument as error:
             raise _at(pointer, error) from None
-        yield from references.references(document["scene"])
 
 
 def _first(variations: Variations) -> Any:

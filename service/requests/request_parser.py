@@ -46,7 +46,7 @@ class ParsedRequest:
     settings: ResolvedSettings
     scene: Scene
     document: bytes
-    assets: list[str] = field(default_factory=list)  # that the scene refers to
+    uses: list[tuple[str, str]] = field(default_factory=list)  # JSON pointers of the scene's assets, and their ids
     label: str | None = None
     priority: int = 0
     digest: str = ""  # of the body as parsed JSON, where that was asked for
@@ -70,10 +70,11 @@ class RequestParser:
         document = load_json(body)
         request = validated(_RENDER_REQUEST, document, "")
         scene, settings = self.both(request.scene, request.settings)
-        assets, digest = references.references(request.scene), digest_of(document) if keyed else ""
+        uses = [(f"/scene{pointer}", ref) for pointer, ref in references.pointed(request.scene)]
+        digest = digest_of(document) if keyed else ""
         folded_scene = folded(request.scene)
         return ParsedRequest(
-            settings, scene, folded_scene, assets, request.label, request.priority, digest, request.callback
+            settings, scene, folded_scene, uses, request.label, request.priority, digest, request.callback
         )
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:

@@ -38,19 +38,19 @@ class RequestReader(RequestParser):
         self._access = access
         self._shared = PackCache(SHARED, self.caches)
 
-    def pack(self, scene: Scene, cache: PackCache | None = None, owner: str = "") -> Packed:
-        """`owner`: whose assets the scene may use; "": all."""
+    def pack(self, scene: Scene, cache: PackCache | None = None, *, owner: str) -> Packed:
+        """`owner`: whose assets the scene may use; "": all, for scenes of the server itself and without keys."""
         assets = self._assets if self._access is None else self._access.view(owner, scene)
         with _under("/scene"):
             return pack(scene, assets, cache, self._config, self._shared)
 
-    def pack_material(self, material: Material, owner: str = "") -> SceneData:
+    def pack_material(self, material: Material, *, owner: str) -> SceneData:
         """The same for one material, which has no textures; pointers begin with /material."""
         assets = self._assets if self._access is None else self._access.view(owner, lone_material(material))
         with _under("/material"):
             return pack_material(material, assets, self._config, self._shared)
 
-    def lut(self, id: str, owner: str = "") -> Lut:
+    def lut(self, id: str, *, owner: str) -> Lut:
         """A table of displayed colours, which `owner` may use. Raises InvalidDocument."""
         try:
             if self._access is not None:

@@ -28,7 +28,7 @@ from service.routes import answers, batch_files, waiting
 from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
 from service.routes.renders import IdempotencyHeader, ImageQuery, Wait, lut_of
-from service.routes.submission import ID_BYTES, LONGEST_KEY, pinned
+from service.routes.submission import ID_BYTES, LONGEST_KEY, allowed
 from service.scene.look import Lut, ToneMap, shown_as
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.system.executors import storing
@@ -125,8 +125,8 @@ async def _started(state: AppState, owner: str, parsed: ParsedBatch, key: Idempo
         len(parsed.body) + len(parsed.axes), parsed.callback,
     )  # fmt: skip
     state.callbacks.check(parsed.callback, owner, state.render_queue.store is not None)
-    async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
-        batch = await state.batches.submit(order, parsed.body, parsed.assets, key)
+    async with allowed(state, owner, parsed.uses) as uses:
+        batch = await state.batches.submit(order, parsed.body, uses, key)
     if parsed.callback is not None:
         state.callbacks.follow(batch)
     return batch

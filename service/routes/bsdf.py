@@ -82,7 +82,7 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
         material: SceneData = pack_material(asked.material)
     else:  # a file has to be read
         reader = state.reader
-        material = await packing(lambda: reader.pack_material(asked.material, owner))
+        material = await packing(lambda: reader.pack_material(asked.material, owner=owner))
     question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner)
     answer = asyncio.ensure_future(state.bsdf.ask(question, caller_of(request)))
     if not await until(request, answer):

@@ -303,7 +303,7 @@ async def lut_of(request: Request, id: str | None) -> messages.Lut | None:
     """The table of colours that a query names. Raises InvalidDocument."""
     if id is None:
         return None
-    return await storing(partial(app_state(request).reader.lut, id, owner_of(request)), caller_of(request))
+    return await storing(partial(app_state(request).reader.lut, id, owner=owner_of(request)), caller_of(request))
 
 
 async def _written(downloads: Downloads, job: Job, query: ImageQuery, lut: messages.Lut | None) -> Written:

@@ -6,7 +6,7 @@ import asyncio
 import secrets
 import time
 import weakref
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
@@ -22,6 +22,7 @@ from service.renders.status import status
 from service.renders.store.record import IdempotencyKey, Order, StoredRender
 from service.requests.request_parser import ParsedRequest
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
+from service.storage.asset_access import NO_USES, AllowedUses, Use
 from service.storage.quota import Quota
 from service.system.executors import opening, packing
 
@@ -85,9 +86,9 @@ async def _submitted(
 ) -> Job:
     state.render_queue.admit(owner)
     state.callbacks.check(parsed.callback, owner, state.render_queue.store is not None)
-    async with pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
+    async with allowed(state, owner, parsed.uses) as uses:
         job = await _packed(state, parsed, owner, began)
-        await state.render_queue.submit(job, parsed.assets, key)
+        await state.render_queue.submit(job, uses, key)
     if parsed.callback is not None:
         state.callbacks.follow(job)
     return job
@@ -117,7 +118,16 @@ def _turn(state: AppState, owner: str, key: str) -> asyncio.Lock:
 
 
 @asynccontextmanager
-async def pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
+async def allowed(state: AppState, owner: str, uses: Sequence[Use]) -> AsyncIterator[AllowedUses]:
+    """A context in which the assets that a document uses are there, until the store says that they are in use.
+
+    Raises InvalidDocument with the pointers of those that its owner may not use."""
+    async with _pinned(state.storage.quota, {ref for _, ref in uses}):
+        yield await opening(partial(state.storage.access.allowed, owner, uses)) if uses else NO_USES
+
+
+@asynccontextmanager
+async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
     """A context in which these assets are not deleted. A thread waits for the quota's lock, as that may take
     seconds."""
     if not ids:

@@ -49,6 +49,13 @@ class Values(Model):
         scene = _with(document["scene"], _steps(self.path), self.values[step])
         return {**document, "scene": scene}
 
+    def written(self, step: int) -> Any:
+        """What a step writes into a scene, by itself; entries of lists are members here, named by their indices."""
+        value = self.values[step]
+        for name in reversed(_steps(self.path)):
+            value = {name: value}
+        return value
+
 
 class Patches(Model):
     """Merge patches (RFC 7396) of `{scene?, settings?}`, one a step."""
@@ -84,6 +91,10 @@ class Patches(Model):
             raise InvalidDocument([FieldError("", f"has {min(unknown)!r}: only scene and settings can be patched")])
         return dict(merge_patch(document, patch))
 
+    def written(self, step: int) -> Any:
+        """See Values."""
+        return merge_patch(None, self.patches[step].get("scene"))
+
 
 class Turntable(Model):
     """The camera turns about +Y through its target, and looks at it all the while."""
@@ -115,6 +126,10 @@ class Turntable(Model):
             return document
         return {**document, "scene": {**document["scene"], "camera": turned}}
 
+    def written(self, step: int) -> Any:
+        """See Values."""
+        return {}  # but for numbers
+
 
 class Times(Model):
     """A glTF file's animation at each of these times: the scene's shapes and lights of the file are posed anew."""
@@ -145,6 +160,10 @@ class Times(Model):
     def applied(self, document: dict[str, Any], step: int) -> dict[str, Any]:
         return document  # what moves is known once the file was read
 
+    def written(self, step: int) -> Any:
+        """See Values."""
+        return {}
+
 
 class PosedTimes(Times):
     """Such an axis as it is stored, of a batch that was accepted."""
@@ -162,6 +181,10 @@ class PosedTimes(Times):
                 things[int(place)] = {name: value for name, value in changed.items() if value is not None}
             scene[kind] = things
         return {**document, "scene": scene}
+
+    def written(self, step: int) -> Any:
+        """See Values."""
+        return self.poses[step]
 
 
 def _kind(value: Any) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
+
+from service.problems import escaped
 
 Step = str | int
 
@@ -13,12 +15,8 @@ def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
     if not isinstance(scene, dict):
         return
     holders: list[tuple[tuple[Step, ...], Any]] = [(("environment",), scene.get("environment"))]
-    if isinstance(textures := scene.get("textures"), dict):
-        holders += [(("textures", name), texture) for name, texture in textures.items()]
-    if isinstance(shapes := scene.get("shapes"), list):
-        holders += [(("shapes", i), shape) for i, shape in enumerate(shapes)]
-    if isinstance(materials := scene.get("materials"), dict):
-        holders += [(("materials", name), material) for name, material in materials.items()]
+    for kind in ("textures", "shapes", "materials"):
+        holders += [((kind, name), each) for name, each in _members(scene.get(kind))]
     if "type" in scene:  # a material by itself, as users save it
         holders.append(((), scene))
     for place, holder in holders:
@@ -28,6 +26,16 @@ def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
             yield (*place, "asset"), ref
         if isinstance(several := holder.get("assets"), dict):
             yield from (((*place, "assets", key), ref) for key, ref in several.items() if isinstance(ref, str))
+
+
+def _members(value: Any) -> Iterable[tuple[Step, Any]]:
+    """Of an object or a list, whichever of them a document should have there."""
+    return value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+
+
+def pointed(scene: Any) -> list[tuple[str, str]]:
+    """The JSON pointer of each reference in a document, and the asset."""
+    return [("".join(f"/{escaped(step)}" for step in place), ref) for place, ref in places(scene)]
 
 
 def references(scene: Any) -> list[str]:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from service.assets import Assets, AssetStore, ImageData, MeasuredData, MeshData
 from service.assets.store import ID, unknown
-from service.problems import AssetError, NotFound
+from service.problems import AssetError, FieldError, InvalidDocument, NotFound
 from service.scene import Scene
+from service.scene.base import MOST_MISTAKES
 from service.storage.database import Database
 
 # From a JSON array of assets, those that only other owners uploaded and that no document this owner can read uses.
@@ -19,7 +22,11 @@ _FOREIGN = """
     AND NOT EXISTS (SELECT 1 FROM asset_owners WHERE asset = wanted.value AND owner = :owner)
     AND NOT EXISTS (
         SELECT 1 FROM uses JOIN documents USING (kind, name, owner)
-        WHERE uses.asset = wanted.value AND (documents.owner = :owner OR documents.shared)
+        WHERE uses.asset = wanted.value AND (documents.owner = :owner OR documents.shared = 1)
+    )
+    AND NOT EXISTS (
+        SELECT 1 FROM uses JOIN document_readers USING (kind, name, owner)
+        WHERE uses.asset = wanted.value AND document_readers.reader = :owner
     )
     AND NOT EXISTS (
         SELECT 1 FROM render_uses JOIN renders USING (number)
@@ -30,6 +37,21 @@ _FOREIGN = """
         WHERE batch_uses.asset = wanted.value AND batches.owner = :owner
     )
 """
+
+
+Use = tuple[str, str]  # a JSON pointer, and the reference to an asset that stands there
+
+
+@dataclass(frozen=True)
+class AllowedUses:
+    """The assets of one document that its owner may use, which gives them to the owner for as long as the document is
+    stored. `AssetAccess.allowed` alone makes them."""
+
+    owner: str
+    assets: tuple[str, ...]
+
+
+NO_USES = AllowedUses("", ())
 
 
 class AssetAccess:
@@ -55,6 +77,24 @@ class AssetAccess:
         with self._database.open() as database:
             rows = database.execute(_FOREIGN, {"owner": owner, "ids": json.dumps(asked)})
             return {id for (id,) in rows}
+
+    def allowed(self, owner: str, uses: Sequence[Use]) -> AllowedUses:
+        """What may be stored as used by a document of this owner.
+
+        Raises InvalidDocument with the pointers of references to assets that do not exist, or that this owner may not
+        use, which look the same.
+        """
+        assets = tuple(dict.fromkeys(ref for _, ref in uses))
+        foreign = self.foreign(owner, assets)
+
+        def why_not(ref: str) -> str | None:
+            return unknown(ref).detail if ref in foreign else self._assets.missing(ref)
+
+        missing = ((ref, why) for ref in assets if (why := why_not(ref)) is not None)
+        if first := dict(islice(missing, MOST_MISTAKES)):
+            told = (FieldError(pointer, first[ref]) for pointer, ref in uses if ref in first)
+            raise InvalidDocument(islice(told, MOST_MISTAKES))
+        return AllowedUses(owner, assets)
 
     def view(self, owner: str, scene: Scene) -> Assets:
         """The assets as this owner sees them, for packing this scene."""

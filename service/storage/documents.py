@@ -9,27 +9,21 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from service.assets import AssetStore
-from service.assets.store import unknown
 from service.problems import (
-    FieldError,
     Forbidden,
-    InvalidDocument,
     NotFound,
     PreconditionFailed,
     TooLarge,
     Unavailable,
-    escaped,
 )
 from service.scene import check_saved_material, parse_scene, references
-from service.scene.base import MOST_MISTAKES
 from service.scene.document import Limits
 from service.scene.text import dump_json
-from service.storage.asset_access import AssetAccess
+from service.storage.asset_access import AssetAccess, Use
 from service.storage.database import Database
 from service.storage.quota import Quota
 from service.system.disk_usage import Usage, expected
@@ -50,7 +44,7 @@ class CheckedDocument:
     """A valid document as it is stored, and its references to assets, which need not exist."""
 
     body: str
-    uses: list[tuple[str, str]]  # JSON pointer, reference
+    uses: list[Use]
 
 
 def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
@@ -59,9 +53,7 @@ def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDo
         check_saved_material(document, limits)
     else:
         parse_scene(document, limits=limits)
-    places = references.places(document)
-    uses = [("".join(f"/{escaped(step)}" for step in place), reference) for place, reference in places]
-    return CheckedDocument(dump_json(document), uses)
+    return CheckedDocument(dump_json(document), references.pointed(document))
 
 
 def etag(body: bytes) -> str:
@@ -85,6 +77,7 @@ class Condition:
 
 
 ALWAYS = Condition()
+TABLES = ("documents", "uses", "document_links", "document_readers")  # with rows of one document
 _OWN = "FROM documents WHERE kind = ? AND name = ? AND owner = ?"
 
 
@@ -102,7 +95,6 @@ class Documents:
     def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None, each: int | None = None) -> None:
         self._each = each
         self._database = Database(folder)
-        self._assets = assets
         self._access = AssetAccess(folder, assets)
         self._quota = quota
 
@@ -144,7 +136,7 @@ class Documents:
             if row is None:
                 raise _missing(kind, name)
             if row[1] == BY_LINK:
-                _note_read(database, kind, name, row[2])
+                _note_read(database, (kind, name, row[2]), owner)
         text: str = row[0]
         return text.encode()
 
@@ -169,12 +161,11 @@ class Documents:
         key, size = (kind, name, owner), len(body.encode())
         # Its assets are not deleted to make room for it.
         with self._quota.pinned(uses) if self._quota else nullcontext():
-            foreign = self._access.foreign(owner, uses)
-            self._find_assets(document, uses, foreign)
+            self._access.allowed(owner, document.uses)
             room = self._quota.room(expected([size])) if self._quota else nullcontext()
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
-                self._find_assets(document, uses, foreign)  # again: another process may have deleted one
+                allowed = self._access.allowed(owner, document.uses)  # again: one may be deleted by now
                 old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
                 condition.check(None if old is None else old[3].encode())
                 self._check_share(database, owner, size - (old[2] if old else 0))
@@ -184,10 +175,13 @@ class Documents:
                 row = (*key, int(shared), kept, size, body)
                 database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
                 database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
-                database.executemany("INSERT INTO uses VALUES (?, ?, ?, ?)", [(asset, *key) for asset in uses])
+                rows = [(asset, *key) for asset in allowed.assets]
+                database.executemany("INSERT INTO uses VALUES (?, ?, ?, ?)", rows)
                 database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
                 if shared == BY_LINK:
                     database.execute("INSERT INTO document_links VALUES (?, ?, ?, ?)", (*key, time.time()))
+                else:
+                    database.execute("DELETE FROM document_readers WHERE kind = ? AND name = ? AND owner = ?", key)
                 _expire(database)
         log.info("document saved", {"kind": kind, "name": name, "bytes": size})
         return kept, old is None
@@ -210,9 +204,8 @@ class Documents:
                     raise Forbidden("This document is shared by another key, which alone may delete it.")
                 raise _missing(kind, name)
             condition.check(found[0].encode())
-            database.execute("DELETE FROM documents WHERE kind = ? AND name = ? AND owner = ?", key)
-            database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
-            database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
+            for table in TABLES:
+                database.execute(f"DELETE FROM {table} WHERE kind = ? AND name = ? AND owner = ?", key)
         log.info("document deleted", {"kind": kind, "name": name})
 
     @contextmanager
@@ -242,38 +235,30 @@ class Documents:
                 "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
             )
 
-    def _find_assets(self, document: CheckedDocument, uses: list[str], foreign: set[str]) -> None:
-        """Raises InvalidDocument for an asset that does not exist, or that its owner may not use."""
-
-        def why_not(ref: str) -> str | None:
-            return unknown(ref).detail if ref in foreign else self._assets.missing(ref)
-
-        missing = ((ref, why) for ref in uses if (why := why_not(ref)) is not None)
-        first = dict(islice(missing, MOST_MISTAKES))
-        if first:
-            told = (FieldError(pointer, first[ref]) for pointer, ref in document.uses if ref in first)
-            raise InvalidDocument(islice(told, MOST_MISTAKES))
-
 
 def _listed(titles: dict[str, str]) -> list[dict[str, str]]:
     return [{"name": name, "title": title} for title, name in sorted((titles[name], name) for name in titles)]
 
 
-def _note_read(database: sqlite3.Connection, kind: str, name: str, owner: str) -> None:
-    """Note that a document by link was read: once a day, and not where the disk is full."""
+def _note_read(database: sqlite3.Connection, key: tuple[str, str, str], reader: str) -> None:
+    """Note that a document by link was read, which gives its assets to the reader: once a day, and not where the disk
+    is full."""
     now = time.time()
+    known = "SELECT 1 FROM document_readers WHERE kind = ? AND name = ? AND owner = ? AND reader = ?"
     with suppress(sqlite3.OperationalError), database:
         database.execute(
             "UPDATE document_links SET read_at = ? WHERE kind = ? AND name = ? AND owner = ? AND read_at < ?",
-            (now, kind, name, owner, now - DAY_S),
+            (now, *key, now - DAY_S),
         )
+        if reader not in ("", key[2]) and database.execute(known, (*key, reader)).fetchone() is None:
+            database.execute("INSERT OR IGNORE INTO document_readers VALUES (?, ?, ?, ?)", (*key, reader))
 
 
 def _expire(database: sqlite3.Connection) -> None:
     """Delete documents by link that nobody has read for LINK_DAYS; their assets are no longer in use then."""
     last = time.time() - LINK_DAYS * DAY_S
     old = database.execute("SELECT kind, name, owner FROM document_links WHERE read_at < ?", (last,)).fetchall()
-    for table in ("documents", "uses", "document_links"):
+    for table in TABLES:
         database.executemany(f"DELETE FROM {table} WHERE kind = ? AND name = ? AND owner = ?", old)
     if old:
         log.info(f"deleted documents that nobody had read by their links for {LINK_DAYS} days", {"count": len(old)})

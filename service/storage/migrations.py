@@ -160,5 +160,15 @@ MIGRATIONS = (
             "CREATE INDEX callbacks_by_subject ON callbacks (subject)",
         ),
     ),
+    Migration(
+        "who has read a document that a link leads to",
+        (
+            # Reading it gives its assets to the reader, for as long as the link leads there.
+            """CREATE TABLE document_readers (
+                kind TEXT NOT NULL, name TEXT NOT NULL, owner TEXT NOT NULL, reader TEXT NOT NULL,
+                PRIMARY KEY (kind, name, owner, reader)
+            ) WITHOUT ROWID""",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -86,7 +86,7 @@ class EditSession:
 
     def lut(self, id: str) -> Lut:
         """A table of displayed colours. Raises InvalidDocument."""
-        return self._reader.lut(id, self._owner)
+        return self._reader.lut(id, owner=self._owner)
 
     def settle(self) -> Update | None:
         """The update that brings the renderer up to the documents; None when it is there."""
@@ -186,7 +186,7 @@ class EditSession:
             update = replace(update, denoise=new.settings.denoise)
         touched = None if old is None else self._diff(old, new)
         if old is None or touched is None or touched.whole:
-            packed = self._reader.pack(new.scene, self._cache, self._owner)
+            packed = self._reader.pack(new.scene, self._cache, owner=self._owner)
             self._reader.memory.hold("scenes", self, COPIES * weight(packed))
             edit = None if old is None else scene_edit(self._arrays, packed.arrays)
             self._arrays = packed.arrays

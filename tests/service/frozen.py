@@ -41,6 +41,7 @@ MADE_BY = {
     "7": "2bdc3dd",
     "8": "944d792",
     "9": "64a7ca7",
+    "10": "54ea1eb4",
 }
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")

@@ -48,7 +48,7 @@ def test_what_nobody_is_known_to_have_uploaded_is_everybody_s(kept: Storage) -> 
 def test_documents_share_their_assets(kept: Storage) -> None:
     id = upload(kept, "anna", OBJ)
     assert kept.access.foreign("anna", [id]) == kept.access.foreign("", [id]) == set()
-    for shared, foreign in ((PRIVATE, {id}), (SHARED, set()), (BY_LINK, set()), (PRIVATE, {id})):
+    for shared, foreign in ((PRIVATE, {id}), (SHARED, set()), (BY_LINK, {id}), (PRIVATE, {id})):
         kept.documents.put("scenes", "a", checked("scenes", mesh_scene(id)), None, "anna", shared)
         assert kept.access.foreign("bert", [id]) == foreign
     with pytest.raises(InvalidDocument) as refused:

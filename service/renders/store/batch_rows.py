@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
 from dataclasses import dataclass
 
 from service.renders.store.record import IdempotencyKey
 from service.renders.store.rows import KEY_S
 from service.storage import callback_rows
+from service.storage.asset_access import AllowedUses
 from service.storage.database import Database
 
 
@@ -42,8 +42,8 @@ class BatchRows:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def insert(self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None) -> int:
-        """Store a batch; its number. `body`: its folded `{scene, settings}`, `uses`: the ids of its assets."""
+    def insert(self, order: BatchOrder, body: bytes, uses: AllowedUses, key: IdempotencyKey | None) -> int:
+        """Store a batch; its number. `body`: its folded `{scene, settings}`, `uses`: its assets."""
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             number = database.execute(
@@ -55,7 +55,7 @@ class BatchRows:
                 ),
             ).lastrowid  # fmt: skip
             assert number is not None
-            database.executemany("INSERT INTO batch_uses VALUES (?, ?)", [(asset, number) for asset in set(uses)])
+            database.executemany("INSERT INTO batch_uses VALUES (?, ?)", [(asset, number) for asset in uses.assets])
             callback_rows.insert(database, "batch", order.id, order.owner, order.callback, order.created_at)
         return number
 

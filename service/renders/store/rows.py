@@ -17,6 +17,7 @@ from service.renders.store.record import (
     stored_render,
 )
 from service.storage import callback_rows
+from service.storage.asset_access import AllowedUses
 from service.storage.database import Database
 
 KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
@@ -54,12 +55,12 @@ class RenderRows:
         order: Order,
         outcome: Outcome,
         document: bytes,
-        uses: Collection[str],
+        uses: AllowedUses,
         key: IdempotencyKey | None,
         patch: bytes | None = None,
         base: int | None = None,
     ) -> int:
-        """Store a render that waits; its number. `uses`: the ids of the assets that it refers to.
+        """Store a render that waits; its number. `uses`: the assets that it refers to.
 
         Its scene is the `document` with `patch` merged in. `base`: the number of a render that brought the same
         document, which is not stored again while it is there.
@@ -80,7 +81,7 @@ class RenderRows:
             ).rowcount:
                 database.execute("INSERT INTO render_documents VALUES (?, ?)", (number, document))
             database.executemany(
-                "INSERT OR IGNORE INTO render_uses VALUES (?, ?)", [(asset, number) for asset in uses]
+                "INSERT OR IGNORE INTO render_uses VALUES (?, ?)", [(asset, number) for asset in uses.assets]
             )
             callback_rows.insert(database, "render", order.id, order.owner, order.callback, order.created_at)
             if key is not None:

@@ -26,6 +26,7 @@ from service.renders.store.record import ENDED, IdempotencyKey, Order, Outcome, 
 from service.renders.store.rows import RenderRows
 from service.requests.batch_request import document_of_step
 from service.requests.request_parser import patched
+from service.storage.asset_access import AllowedUses
 from service.storage.database import Database
 from service.storage.stores import RENDERS
 from service.system.disk_usage import Usage, expected
@@ -144,7 +145,7 @@ class RenderStore:
         order: Order,
         outcome: Outcome,
         document: bytes,
-        uses: Collection[str],
+        uses: AllowedUses,
         key: IdempotencyKey | None = None,
         reserved: bool = False,
         patch: bytes | None = None,
@@ -171,7 +172,7 @@ class RenderStore:
         return self._rows.members()
 
     async def insert_batch(
-        self, order: BatchOrder, body: bytes, uses: Collection[str], key: IdempotencyKey | None
+        self, order: BatchOrder, body: bytes, uses: AllowedUses, key: IdempotencyKey | None
     ) -> int:
         """The number of a batch that is on the disk from now on; see BatchRows."""
 

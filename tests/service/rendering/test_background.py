@@ -24,6 +24,7 @@ from service.renders.slots import Slots
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import RequestReader
+from service.storage.asset_access import NO_USES
 from service.storage.callback_rows import CallbackRows, insert
 from service.storage.database import Database
 from service.streams.sessions import Sessions
@@ -71,7 +72,9 @@ def once(work: Callable[..., Any]) -> Callable[..., Any]:
 async def stored(renderers: Any, folder: Path) -> tuple[Job, RenderStore]:
     store, order = RenderStore(folder), Order("id", "", SETTINGS, bytes=8)
     job = Job(renderers, order, load)
-    job.recorder = Recorder(store, await store.insert(order, Outcome(), b"document", []), "id", renderers=renderers)
+    job.recorder = Recorder(
+        store, await store.insert(order, Outcome(), b"document", NO_USES), "id", renderers=renderers
+    )
     return job, store
 
 

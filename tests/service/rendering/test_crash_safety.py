@@ -18,6 +18,7 @@ from service.renders.store.pictures import PictureFiles
 from service.renders.store.record import Outcome, StoredRender
 from service.renders.store.rows import RenderRows
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES
 from tests.service.rendering.stored import DOCUMENT, order, picture
 
 HALF, WHOLE = Progress(8, 0.2, 1.0), Progress(64, 0.1, 4.0)
@@ -42,7 +43,7 @@ def crash(monkeypatch: pytest.MonkeyPatch, where: Any, name: str, after: bool = 
 
 async def under_way(store: RenderStore) -> Recorder:
     """A render that has a checkpoint."""
-    number = await store.insert(order("a"), Outcome(), DOCUMENT, [])
+    number = await store.insert(order("a"), Outcome(), DOCUMENT, NO_USES)
     recorder = Recorder(store, number, "a")
     await recorder.start(Outcome())
     assert await recorder.store_now(lambda: recorder.checkpoint(Checkpoint(1, 1, HALF, picture().saved)))

@@ -23,6 +23,7 @@ from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
 from service.requests.request_parser import folded
 from service.scene import parse_settings
+from service.storage.asset_access import NO_USES
 from service.storage.database import FILE
 from tests.serving import ENDLESS, KEYS, PATIENCE_S, SCENE, SMALL, Server, kill, wait_until
 
@@ -137,7 +138,7 @@ def test_renders_with_large_documents_share_little_memory_after_a_restart(gpu: R
     async def stored() -> None:
         for id in ids:
             order = Order(id, "", settings, created_at=time.time(), bytes=len(document))
-            await store.insert(order, Outcome("running"), document, [])
+            await store.insert(order, Outcome("running"), document, NO_USES)
         await store.close()
 
     asyncio.run(stored())

@@ -30,6 +30,7 @@ from service.renders.job import Job
 from service.renders.recorder import MOST_STARTS, Recorder
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES
 from tests.service.rendering.fakes import SETTINGS, Renderers, load, until
 
 SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])
@@ -37,7 +38,7 @@ SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])
 
 async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = None) -> Job:
     order = Order("id", "", SETTINGS, bytes=8)
-    number = await store.insert(order, outcome or Outcome(), b"document", [])
+    number = await store.insert(order, outcome or Outcome(), b"document", NO_USES)
     job = Job(renderers, order, load, outcome=outcome)
     job.recorder = Recorder(store, number, "id", renderers=renderers)
     return job

@@ -16,6 +16,7 @@ from service.problems import Unavailable
 from service.renders.store.pictures import PictureFiles
 from service.renders.store.record import Outcome
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES
 from service.storage.database import FILE
 from service.storage.lost_pictures import KEEP
 from service.storage.stores import storage
@@ -35,7 +36,7 @@ def stored(folder: Path, *ids: str) -> None:
     async def insert() -> None:
         store = RenderStore(folder)
         for id in ids:
-            number = await store.insert(order(id), Outcome(), DOCUMENT, [])
+            number = await store.insert(order(id), Outcome(), DOCUMENT, NO_USES)
             if id == ids[-1]:
                 await store.write(id, "checkpoint", picture())
                 await store.update(number, Outcome("running"))

@@ -34,6 +34,7 @@ from service.renders.recorder import Recorder
 from service.renders.store import rows
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES
 from service.storage.database import FILE
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
@@ -80,7 +81,7 @@ class RenderMachine(RuleBasedStateMachine):
         return found
 
     async def _first(self) -> None:
-        await RenderStore(self.folder).insert(Order("id", "", SETTINGS, bytes=8), Outcome(), b"document", [])
+        await RenderStore(self.folder).insert(Order("id", "", SETTINGS, bytes=8), Outcome(), b"document", NO_USES)
         await self._serve()
 
     async def _serve(self) -> None:
@@ -345,7 +346,7 @@ def test_a_renderer_that_is_lost_after_the_end_takes_nothing_with_it(tmp_path: P
         store, farm = Disk(tmp_path), Farm()
         order = Order("id", "", SETTINGS, bytes=8)
         job: Any = Job(farm, order, load)  # type: ignore[arg-type]
-        job.recorder = Recorder(store, await store.insert(order, Outcome(), b"document", []), "id")
+        job.recorder = Recorder(store, await store.insert(order, Outcome(), b"document", NO_USES), "id")
         running = asyncio.create_task(job.run())
         await until(lambda: 1 in farm.samples)
         farm.samples[1] = 8

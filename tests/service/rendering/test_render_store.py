@@ -23,6 +23,7 @@ from service.renders.store import store as store_module
 from service.renders.store.pictures import DamagedPicture, PictureFiles
 from service.renders.store.record import IdempotencyKey, Outcome
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.database import Database
 from service.storage.stores import storage
 from tests.service.rendering.stored import DOCUMENT, PROGRESS, order, picture
@@ -138,7 +139,7 @@ def test_a_folder_that_cannot_be_written_to_is_seen(
 def test_rows_come_back_in_their_order(tmp_path: Path) -> None:
     async def test() -> None:
         store = RenderStore(tmp_path)
-        numbers = [await store.insert(order(id, "anna"), Outcome(), DOCUMENT, []) for id in "abc"]
+        numbers = [await store.insert(order(id, "anna"), Outcome(), DOCUMENT, NO_USES) for id in "abc"]
         error = InvalidDocument([FieldError("/scene", "is too large")])
         failed = Outcome(warnings=["w"], progress=PROGRESS, setup_s=2.0).failed(error, 200.0)
         await store.update(numbers[0], failed)
@@ -158,7 +159,7 @@ def test_rows_come_back_in_their_order(tmp_path: Path) -> None:
 def test_what_is_gone_is_remembered_and_its_key_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def test() -> None:
         store = RenderStore(tmp_path)
-        number = await store.insert(order("a"), Outcome(), DOCUMENT, [], IdempotencyKey("k", "digest"))
+        number = await store.insert(order("a"), Outcome(), DOCUMENT, NO_USES, IdempotencyKey("k", "digest"))
         await store.write("a", "picture", picture())
         await store.forget([(number, "a")])
         assert [(each.order.id, each.gone) for each in RenderStore(tmp_path).load()] == [("a", True)]
@@ -180,7 +181,7 @@ def test_rows_of_gone_renders_are_small(tmp_path: Path) -> None:
     async def test() -> None:
         store = RenderStore(tmp_path)
         warned = Outcome("done", "max_samples", PROGRESS, warnings=["w" * 1000], ended_at=200.0)
-        number = await store.insert(order("a"), Outcome(), DOCUMENT, [], IdempotencyKey("k", "digest"))
+        number = await store.insert(order("a"), Outcome(), DOCUMENT, NO_USES, IdempotencyKey("k", "digest"))
         await store.update(number, warned)
         await store.forget([(number, "a")])
         with Database(tmp_path).open() as database:
@@ -199,7 +200,9 @@ def test_a_start_reads_only_the_gone_ones_that_are_remembered(
 
     async def test() -> None:
         store = RenderStore(tmp_path)
-        numbers = [await store.insert(order(id), Outcome(), DOCUMENT, [], IdempotencyKey(id, "d")) for id in "abcde"]
+        numbers = [
+            await store.insert(order(id), Outcome(), DOCUMENT, NO_USES, IdempotencyKey(id, "d")) for id in "abcde"
+        ]
         await store.forget([(number, id) for number, id in zip(numbers[:4], "abcd", strict=True)])
         assert [(each.order.id, each.gone) for each in RenderStore(tmp_path).load()] == [
             ("c", True),
@@ -218,9 +221,9 @@ def test_keys_of_one_owner_are_bounded(tmp_path: Path, monkeypatch: pytest.Monke
 
     async def test() -> None:
         store = RenderStore(tmp_path)
-        await store.insert(order("bert's", "bert"), Outcome(), DOCUMENT, [], IdempotencyKey("0", "d"))
+        await store.insert(order("bert's", "bert"), Outcome(), DOCUMENT, NO_USES, IdempotencyKey("0", "d"))
         numbers = [
-            await store.insert(order(key, "anna"), Outcome(), DOCUMENT, [], IdempotencyKey(key, "d"))
+            await store.insert(order(key, "anna"), Outcome(), DOCUMENT, NO_USES, IdempotencyKey(key, "d"))
             for key in "01234"
         ]
         known = [await store.keyed("anna", key) is not None for key in "01234"]
@@ -238,7 +241,7 @@ def test_assets_of_stored_renders_stay(tmp_path: Path) -> None:
         kept = storage(Config(data_dir=tmp_path, data_quota=410_000))
         store = RenderStore(tmp_path, kept.quota.room)
         used, other = (kept.assets.add(OBJ + b"#" * size).id for size in (10, 20))
-        number = await store.insert(order("a"), Outcome(), DOCUMENT, [used])
+        number = await store.insert(order("a"), Outcome(), DOCUMENT, AllowedUses("", (used,)))
         for size in range(40):  # until room has to be made
             kept.assets.add(OBJ + b"#" * (9000 + size))
         assert kept.assets.holds(used) and not kept.assets.holds(other)
@@ -258,7 +261,8 @@ def test_check_data_reads_renders(tmp_path: Path, capsys: pytest.CaptureFixture[
     async def test() -> None:
         store = RenderStore(tmp_path)
         for id in "abc":
-            number = await store.insert(order(id), Outcome(), DOCUMENT, ["sha256:" + "0" * 64] if id == "c" else [])
+            uses = AllowedUses("", ("sha256:" + "0" * 64,)) if id == "c" else NO_USES
+            number = await store.insert(order(id), Outcome(), DOCUMENT, uses)
             await store.write(id, "picture", picture(reason="max_samples"))
             await store.update(number, Outcome("done", "max_samples", PROGRESS, ended_at=200.0))
 

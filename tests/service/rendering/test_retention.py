@@ -21,6 +21,7 @@ from service.renders.retention import KeptRenders, Retention
 from service.renders.status import status
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
+from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.quota import QuotaUsedUp, reserve_bytes
 from service.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
@@ -179,7 +180,7 @@ def test_what_is_deleted_is_gone_from_everywhere(tmp_path: Path) -> None:
         asset = disk.upload("a")
         order = Order("id", "a", SETTINGS, bytes=8)
         job: Any = Job(Renderers(), order, load, b"document")  # type: ignore[arg-type]
-        await disk.queue.submit(job, [asset])
+        await disk.queue.submit(job, AllowedUses("a", (asset,)))
         disk.queue.cancel(job)
         saved = SavedPicture(8, (0, 0, 0), [np.zeros(64, np.uint8)])
         await disk.store.write("id", "picture", Restore(1, 1, saved, "stopped", Progress(8)))
@@ -204,7 +205,7 @@ def test_what_is_deleted_is_gone_from_everywhere(tmp_path: Path) -> None:
 def test_a_row_of_before_has_no_time_of_its_start(tmp_path: Path) -> None:
     async def scenario() -> None:
         store = RenderStore(tmp_path)
-        number = await store.insert(Order("old", "", SETTINGS, created_at=0.25), Outcome(), b"", [])
+        number = await store.insert(Order("old", "", SETTINGS, created_at=0.25), Outcome(), b"", NO_USES)
         await store.update(number, Outcome("done", ended_at=1.5))
         (stored,) = store.load()
         told = status(stored.order, stored.outcome, renderers=0)

@@ -25,6 +25,7 @@ from service.renders.slots import Slots
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import weight
+from service.storage.asset_access import NO_USES
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, Renderers, until
@@ -57,7 +58,7 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
     async def scenario() -> None:
         store, renderers = RenderStore(tmp_path), Quick()
         for id in range(8):
-            await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", [])
+            await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", NO_USES)
         queue = RenderQueue(replace(LIMITS, running=8), store)
         budget.cache("pictures", lambda: 0, queue.resting.shrink)
         made = lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
@@ -81,7 +82,7 @@ def test_what_waits_for_memory_has_neither_memory_nor_a_slot(tmp_path: Path) -> 
 
     async def scenario() -> None:
         store = RenderStore(tmp_path)
-        await store.insert(Order("a", "", SETTINGS, bytes=8), Outcome("running"), b"document", [])
+        await store.insert(Order("a", "", SETTINGS, bytes=8), Outcome("running"), b"document", NO_USES)
         queue = RenderQueue(replace(LIMITS, running=1), store)
         budget.hold("scenes", queue, 3 * PICTURE - 1)
         queue.resume(store.load(), lambda stored: Job(Renderers(), stored.order, load, budget=budget))  # type: ignore[arg-type]

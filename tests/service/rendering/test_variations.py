@@ -26,6 +26,7 @@ from service.requests.request_parser import folded, unfolded
 from service.requests.request_reader import RequestReader
 from service.scene import merge_patch
 from service.scene.document import Parsed
+from service.storage.asset_access import NO_USES
 from service.storage.data_check import Report
 from service.storage.database import FILE
 from tests.documents import Shelf
@@ -81,10 +82,12 @@ def test_a_document_is_stored_once_and_each_render_has_its_own_scene(tmp_path: P
 def test_a_document_that_is_gone_is_stored_again(tmp_path: Path) -> None:
     async def scenario() -> None:
         store = RenderStore(tmp_path)
-        first = await store.insert(Order("a", "", SETTINGS), Outcome(), folded(SCENE), [])
+        first = await store.insert(Order("a", "", SETTINGS), Outcome(), folded(SCENE), NO_USES)
         await store.forget([(first, "a")])
         patch = folded(PATCHES[0])
-        number = await store.insert(Order("b", "", SETTINGS), Outcome(), folded(SCENE), [], patch=patch, base=first)
+        number = await store.insert(
+            Order("b", "", SETTINGS), Outcome(), folded(SCENE), NO_USES, patch=patch, base=first
+        )
         assert json.loads(unfolded(await store.document(number))) == merge_patch(SCENE, PATCHES[0])
 
     asyncio.run(scenario())
