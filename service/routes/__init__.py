@@ -2,6 +2,7 @@
 
 renders          renders over REST
 submission       how a request for a render becomes one that waits
+idempotency      requests that may be sent twice
 batches          renders that differ along axes
 batch_files      the pictures of a batch in one file
 callbacks        which ends of renders and batches were told to whom

@@ -24,11 +24,12 @@ from service.problems import Conflict, FieldError, InvalidDocument, TooLarge
 from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import IdempotencyKey
 from service.requests.batch_request import ParsedBatch
-from service.routes import answers, batch_files, waiting
+from service.routes import answers, batch_files, idempotency, waiting
 from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
-from service.routes.renders import IdempotencyHeader, ImageQuery, Wait, lut_of
-from service.routes.submission import ID_BYTES, LONGEST_KEY, allowed
+from service.routes.idempotency import IdempotencyHeader
+from service.routes.renders import ImageQuery, Wait, lut_of
+from service.routes.submission import ID_BYTES, allowed
 from service.scene.look import Lut, ToneMap, shown_as
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.system.executors import storing
@@ -84,39 +85,31 @@ class AnimationQuery(Shown):
 )
 async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> Response:
     state, owner = app_state(request), owner_of(request)
-    if idempotency_key is not None and not 1 <= len(idempotency_key) <= LONGEST_KEY:
-        raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
-    parsed = await _parsed(request)
-    batch = await _known(state, owner, idempotency_key, parsed)
-    if batch is None:
-        parsed = await storing(partial(with_poses, parsed, state.storage, owner), caller_of(request))
-        key = None if idempotency_key is None else IdempotencyKey(idempotency_key, parsed.digest)
-        batch = await _started(state, owner, parsed, key)
+    idempotency.check_key(state, idempotency_key)
+    parsed = await _parsed(request, idempotency_key)
+
+    async def make(key: IdempotencyKey | None) -> Batch:
+        posed = await storing(partial(with_poses, parsed, state.storage, owner), caller_of(request))
+        return await _started(state, owner, posed, key)
+
+    keyed = state.batches.keyed
+    found = await idempotency.once(state, "batch", owner, idempotency_key, parsed.digest, keyed, make)
+    batch = state.batches.get(found, owner) if isinstance(found, str) else found
     document = {"id": batch.id, "renders": batch.order.renders}
     return JSONResponse(document, 202, {"location": f"batches/{batch.id}"})
 
 
-async def _parsed(request: Request) -> ParsedBatch:
-    state = app_state(request)
+async def _parsed(request: Request, key: str | None) -> ParsedBatch:
+    state, owner = app_state(request), owner_of(request)
     async with state.bodies.taken(request) as body:
         if len(body) > MOST_BYTES:
             detail = f"The body of a batch holds at most {MOST_BYTES // MIB} MiB: upload geometry as assets."
             raise TooLarge(detail)
-        state.batches.admit(owner_of(request))
+        if await idempotency.is_new(owner, key, state.batches.keyed):
+            state.batches.admit(owner)
         await state.renderers.able(STARTING_S)
         parsed: ParsedBatch = await state.bodies.parsed("batch", body, caller_of(request))
     return parsed
-
-
-async def _known(state: AppState, owner: str, key: str | None, parsed: ParsedBatch) -> Batch | None:
-    """The batch that an equal request made earlier."""
-    known = None if key is None else await state.batches.keyed(owner, key)
-    if known is None:
-        return None
-    digest, id = known
-    if digest != parsed.digest:
-        raise Conflict("This Idempotency-Key was used for another request.")
-    return state.batches.get(id, owner)
 
 
 async def _started(state: AppState, owner: str, parsed: ParsedBatch, key: IdempotencyKey | None) -> Batch:

@@ -12,7 +12,7 @@ from typing import Annotated, BinaryIO, get_args
 from urllib.parse import urlencode
 
 import numpy as np
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -30,6 +30,7 @@ from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
+from service.routes.idempotency import IdempotencyHeader
 from service.scene.look import Lut, ToneMap, shown_as
 from service.scene.text import load_json
 from service.state import MOST_WAITS, app_state, caller_of, owner_of
@@ -57,7 +58,6 @@ FLOAT_BYTES = 4  # of a number in a layer, as the renderer sends it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
 
-IdempotencyHeader = Annotated[str | None, Header(description="1 to 200 characters, the caller's own name for this.")]
 MOST_LISTED = 200
 
 

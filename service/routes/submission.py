@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 import time
-import weakref
 from collections.abc import AsyncIterator, Collection, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
@@ -15,21 +13,19 @@ from typing import Any
 from starlette.requests import Request
 
 from service.pack import Packed
-from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
+from service.problems import ServiceError
 from service.quality import ResolvedSettings
 from service.renders.job import Job
 from service.renders.status import status
 from service.renders.store.record import IdempotencyKey, Order, StoredRender
 from service.requests.request_parser import ParsedRequest
+from service.routes import idempotency
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.storage.asset_access import NO_USES, AllowedUses, Use
 from service.storage.quota import Quota
 from service.system.executors import opening, packing
 
 ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an option in a shell
-LONGEST_KEY = 200  # characters
-
-_turns: weakref.WeakValueDictionary[tuple[int, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
 
 
 async def one_shot(request: Request) -> Job:
@@ -52,29 +48,25 @@ async def unlisted(state: AppState, owner: str, document: bytes, settings: Resol
 async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     """A queued render, or the earlier one with this idempotency key: its status where it is gone."""
     began, state, owner = time.monotonic(), app_state(request), owner_of(request)
-    if key is None:
-        return await _submitted(state, await _parsed(request, "render"), owner, began)
-    if not 1 <= len(key) <= LONGEST_KEY:
-        raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
+    idempotency.check_key(state, key)
+    parsed = await _parsed(request, "render" if key is None else "keyed_render", key)
+
+    async def make(taken: IdempotencyKey | None) -> Job:
+        return await _submitted(state, parsed, owner, began, taken)
+
+    found = await idempotency.once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
+    return _known(state, found, parsed) if isinstance(found, StoredRender) else found
+
+
+async def _keyed(state: AppState, owner: str, key: str) -> tuple[str, StoredRender] | None:
     store = state.render_queue.store
-    if store is None:
-        raise Unavailable("Idempotency-Key needs the data folder, which cannot be written to.", 60)
-    parsed = await _parsed(request, "keyed_render", key)
-    async with _turn(state, owner, key):
-        known = await store.keyed(owner, key)
-        if known is None:
-            return await _submitted(state, parsed, owner, began, IdempotencyKey(key, parsed.digest))
-    digest, stored = known
-    if digest != parsed.digest:
-        raise Conflict("This Idempotency-Key was used for another request.")
-    return _known(state, stored, parsed)
+    return None if store is None else await store.keyed(owner, key)
 
 
 async def _parsed(request: Request, kind: Any, key: str | None = None) -> ParsedRequest:
     state, owner = app_state(request), owner_of(request)
     async with state.bodies.taken(request) as body:
-        store = state.render_queue.store
-        if key is None or store is None or await store.keyed(owner, key) is None:  # a repetition needs no room
+        if await idempotency.is_new(owner, key, partial(_keyed, state)):
             state.render_queue.admit(owner)
         await state.renderers.able(STARTING_S)
         parsed: ParsedRequest = await state.bodies.parsed(kind, body, caller_of(request))
@@ -110,11 +102,6 @@ def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job 
         return state.render_queue.get(stored.order.id, stored.order.owner)
     except ServiceError:
         return status(replace(stored.order, settings=parsed.settings), stored.outcome, renderers=0)
-
-
-def _turn(state: AppState, owner: str, key: str) -> asyncio.Lock:
-    """A lock for one idempotency key: a second request waits until the first is accepted or refused."""
-    return _turns.setdefault((id(state), owner, key), asyncio.Lock())
 
 
 @asynccontextmanager

@@ -161,13 +161,17 @@ MIGRATIONS = (
         ),
     ),
     Migration(
-        "who has read a document that a link leads to",
+        "who has read a document that a link leads to, and one batch of an idempotency key",
         (
             # Reading it gives its assets to the reader, for as long as the link leads there.
             """CREATE TABLE document_readers (
                 kind TEXT NOT NULL, name TEXT NOT NULL, owner TEXT NOT NULL, reader TEXT NOT NULL,
                 PRIMARY KEY (kind, name, owner, reader)
             ) WITHOUT ROWID""",
+            # Until now requests that came at once made one each.
+            """UPDATE batches SET key = NULL WHERE key IS NOT NULL AND number NOT IN
+                (SELECT max(number) FROM batches WHERE key IS NOT NULL GROUP BY owner, key)""",
+            "CREATE UNIQUE INDEX batches_by_key ON batches (owner, key) WHERE key IS NOT NULL",
         ),
     ),
 )

@@ -46,6 +46,11 @@ class BatchRows:
         """Store a batch; its number. `body`: its folded `{scene, settings}`, `uses`: its assets."""
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
+            if key is not None:  # which is free again where it is too old
+                database.execute(
+                    "UPDATE batches SET key = NULL WHERE owner = ? AND key = ? AND created_at <= ?",
+                    (order.owner, key.key, time.time() - KEY_S),
+                )
             number = database.execute(
                 "INSERT INTO batches (id, owner, label, priority, created_at, renders, bytes, key, digest, axes, "
                 "body) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
