@@ -82,7 +82,7 @@ class AppState:
         most = max(self.config.max_bodies, 4 * self.config.max_body)
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
-        self.batches = BatchQueue(self.render_queue, self._members, self.config.max_running + 1)
+        self.batches = BatchQueue(self.render_queue, self._members, self._ended, self.config.max_running + 1)
         self.callbacks = Callbacks(self.config, self._told_of)
         self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
@@ -145,8 +145,11 @@ class AppState:
         return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
     def _resumed(self, stored: StoredRender) -> Job:
-        load = partial(self._pack, stored.order.owner)
-        return Job(self.renderers, stored.order, load, outcome=stored.outcome, budget=self.memory)
+        return self._ended(stored.order, stored.outcome)
+
+    def _ended(self, order: Order, outcome: Outcome) -> Job:
+        """A render that an earlier server had, or that cannot begin."""
+        return Job(self.renderers, order, partial(self._pack, order.owner), outcome=outcome, budget=self.memory)
 
     async def _pack(self, owner: str, document: bytes, count: Callable[[int], None]) -> Packed:
         """The packed scene of an owner's folded document, which was valid when it was stored. Raises what reading it

@@ -108,9 +108,12 @@ class Batch:
         }
 
     def waiting_status(self, step: int) -> dict[str, Any]:
-        """The status of a render that is not there yet. Its settings are known at its turn."""
-        order = Order(
+        """The status of a render that is not there yet."""
+        return status(self.member(step), Outcome(state=self.state_of(step)), 0)
+
+    def member(self, step: int) -> Order:
+        """What is known of a render before its turn: neither its settings nor its name."""
+        return Order(
             member_id(self.id, step), self.owner, resolve(Settings()), self.order.label, self.order.priority,
             self.order.created_at,
         )  # fmt: skip
-        return status(order, Outcome(state=self.state_of(step)), 0)

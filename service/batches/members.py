@@ -18,6 +18,7 @@ from service.requests.request_parser import folded, unfolded
 from service.requests.request_reader import RequestReader
 from service.scene.document import Parsed
 from service.scene.settings import Settings
+from service.scene.text import most_bytes
 from service.system.executors import packing
 
 # A new render of an order: its document where no store has it, its packed scene where there is one.
@@ -28,9 +29,12 @@ class Members:
     """For one task of the event loop; the work is done in threads."""
 
     def __init__(self, batch: Batch, body: bytes, reader: RequestReader, new_job: NewJob) -> None:
-        """`body`: the folded `{scene, settings}` that varies."""
+        """`body`: the folded `{scene, settings}` that varies, which counts as the work at hand's for as long as this
+        lives. For a thread. Raises TooLarge, TooManyRequests, Unavailable."""
         self._batch, self._reader, self._new_job = batch, reader, new_job
-        self._variations = variations(json.loads(unfolded(body)), batch.order.axes)
+        text = unfolded(body)
+        reader.memory.hold(reader.batch_memory, self, most_bytes(text) + most_bytes(batch.order.axes))
+        self._variations = variations(json.loads(text), batch.order.axes)
         self._cache = PackCache(budget=reader.caches)
         self._before: Parsed | None = None
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import Callable, Collection
 from functools import partial
 
 from service.batches.batch import ID_DIGITS, STEP_DIGITS, Batch, member_id
 from service.batches.members import Members
-from service.problems import Gone, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.problems import MISTAKE, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.renders.job import Job
 from service.renders.queue import RETRY_S, RenderQueue
 from service.renders.store.batch_rows import BatchOrder, StoredBatch
-from service.renders.store.record import IdempotencyKey
+from service.renders.store.record import IdempotencyKey, Order, Outcome
 from service.storage.asset_access import AllowedUses
 from service.system.background import Background
 from service.system.executors import parsing, recording
+from service.system.turns import CALLER
 
 EACH = 32  # batches of one owner that are under way
 AGAIN_S = 5.0  # between two attempts to queue a render where there is no room
@@ -28,9 +30,16 @@ log = logging.getLogger(__name__)
 class BatchQueue:
     """For the event loop. An owner learns of no other's batches."""
 
-    def __init__(self, renders: RenderQueue, members: Callable[[Batch, bytes], Members], ahead: int) -> None:
-        """`ahead`: renders of a batch that wait or run at a time."""
-        self._renders, self._members, self._ahead = renders, members, ahead
+    def __init__(
+        self,
+        renders: RenderQueue,
+        members: Callable[[Batch, bytes], Members],
+        ended: Callable[[Order, Outcome], Job],
+        ahead: int,
+    ) -> None:
+        """`ended` makes a render that has ended before it began. `ahead`: renders of a batch that wait or run at a
+        time."""
+        self._renders, self._members, self._made_ended, self._ahead = renders, members, ended, ahead
         self._batches: dict[str, Batch] = {}  # in the order of arrival
         self._tasks = Background()
 
@@ -38,7 +47,7 @@ class BatchQueue:
         """Store a batch and begin it. Raises what packing its first scene raises; TooManyRequests, Unavailable."""
         self.admit(order.owner)
         batch = Batch(order)
-        members = self._members(batch, body)
+        members = await parsing(partial(self._members, batch, body), batch.client)
         await members.check()
         batch.number = await self._renders.store_batch(batch, order, body, uses, key)
         self._batches = {id: each for id, each in self._batches.items() if not each.gone} | {batch.id: batch}
@@ -123,14 +132,13 @@ class BatchQueue:
 
     async def _feed(self, batch: Batch, members: Members | None) -> None:
         """Put its renders in line, in their order, until all of them were, and wait for the last one's end."""
-        try:
-            await self._put_in_line(batch, members)
-            while not batch.finished.is_set():
-                await self._changed(batch)
-            self._renders.keep(batch)
-        except ServiceError as error:
-            log.error("a batch cannot go on", {"id": batch.id[:6], "error": error})
-            self._give_up(batch)
+        CALLER.set(batch.client)  # also where an earlier server began it
+        line = self._put_in_line(batch, members)
+        del members  # its document leaves the memory when the last render is in line
+        await line
+        while not batch.finished.is_set():
+            await self._changed(batch)
+        self._renders.keep(batch)
 
     def _give_up(self, batch: Batch) -> None:
         """End it, and those of its renders that are not made yet with it: whoever waits for it learns of that."""
@@ -141,17 +149,38 @@ class BatchQueue:
 
     async def _put_in_line(self, batch: Batch, members: Members | None) -> None:
         missing = [step for step in range(batch.order.renders) if step not in batch.jobs]
-        if not missing:
-            return
-        members = members or await self._read(batch)
         for step in missing:
             while batch.ahead >= self._ahead and not batch.cancelled:
                 await self._changed(batch)
             if batch.cancelled:
                 return
-            job = await members.job(step, stored=self._renders.store is not None)
-            while not batch.cancelled and not await self._queued(job, batch, step):
-                await self._changed(batch, AGAIN_S)
+            try:
+                if (members := members or await self._read(batch)) is None:
+                    return
+                job = await members.job(step, stored=self._renders.store is not None)
+                await self._wait_for_room(job, batch, step)
+            except Exception as error:
+                await self._fail(batch, step, error)
+
+    async def _fail(self, batch: Batch, step: int, error: Exception) -> None:
+        """One of its renders cannot be made, which is that render's end; the others go on."""
+        unexpected = not isinstance(error, ServiceError)
+        log.warning(
+            "a render of a batch cannot be made",
+            {"id": member_id(batch.id, step)[:6], "step": step, "error": error},
+            exc_info=error if unexpected else None,
+        )
+        told = error if isinstance(error, ServiceError) else Internal(MISTAKE)
+        job = self._made_ended(batch.member(step), Outcome().failed(told, time.time()))
+        try:
+            await self._wait_for_room(job, batch, step)
+        except Exception:
+            log.exception("a failed render of a batch could not be stored")
+            self._renders.take_member(job, batch, step)
+
+    async def _wait_for_room(self, job: Job, batch: Batch, step: int) -> None:
+        while not batch.cancelled and not await self._queued(job, batch, step):
+            await self._changed(batch, AGAIN_S)
 
     async def _queued(self, job: Job, batch: Batch, step: int) -> bool:
         """Whether there was room for it in line. A batch that was cancelled meanwhile takes it out again."""
@@ -165,15 +194,24 @@ class BatchQueue:
             batch.queueing = False
             if batch.cancelled:
                 self._cancel(batch)
+            else:
+                batch.look()  # it may be the last one, and have ended
         return True
 
-    async def _read(self, batch: Batch) -> Members:
-        """Of a batch that an earlier server began. Raises NotFound."""
+    async def _read(self, batch: Batch) -> Members | None:
+        """Of a batch that an earlier server began, once there is memory for its document and the disk can be read;
+        None where it is cancelled before. Raises NotFound, TooLarge."""
         assert self._renders.store is not None
-        body = await recording(partial(self._renders.store.batches.body, batch.number))
-        if body is None:
-            raise NotFound("The document of this batch is not stored any more.")
-        return await parsing(partial(self._members, batch, body), batch.client)
+        while not batch.cancelled:
+            try:
+                body = await recording(partial(self._renders.store.batches.body, batch.number))
+                if body is None:
+                    raise NotFound("The document of this batch is not stored any more.")
+                return await parsing(partial(self._members, batch, body), batch.client)
+            except (TooManyRequests, Unavailable) as error:
+                log.warning("a batch has to wait", {"id": batch.id[:6], "error": error})
+                await self._changed(batch, AGAIN_S)
+        return None
 
     @staticmethod
     async def _changed(batch: Batch, seconds: float | None = None) -> None:

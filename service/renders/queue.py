@@ -129,7 +129,8 @@ class RenderQueue:
                 job.number = await self.store.insert_member(job.order, job.outcome, batch.number, step)
             finally:
                 self._storing[job.owner] -= 1
-            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
+            whole = job.finished.is_set()
+            job.recorder = Recorder(self.store, job.number, job.id, whole, job.renderers, job.owner)
         self.take_member(job, batch, step)
 
     def take_member(self, job: Job, batch: InBatch, step: int) -> None:

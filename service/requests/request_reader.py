@@ -18,6 +18,7 @@ from service.system.memory import Limit, MemoryBudget
 
 # That renders share: the tables of a map of 512 x 256 texels take 70 ms to make, those of a MERL file 200 ms.
 SHARED = 4
+BATCHES_PART = 4  # of SUNBOX_MEMORY, a part that the documents of batches may take
 
 
 class RequestReader(RequestParser):
@@ -32,6 +33,8 @@ class RequestReader(RequestParser):
         # For documents as JSON values, which merge patches could make ever larger.
         what = "scenes of streams (SUNBOX_MAX_STREAM_MEMORY)"
         self.stream_memory = Limit("documents", config.max_stream_memory, what)
+        most = self.memory.limit // BATCHES_PART
+        self.batch_memory = Limit("documents", most, "documents of batches under way (SUNBOX_MEMORY)")
         self.caches = CacheBudget(config.keep_packed)
         self.memory.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
         self._assets = assets

@@ -95,17 +95,18 @@ class RenderRows:
         return number
 
     def insert_member(self, order: Order, outcome: Outcome, batch: int, step: int) -> int:
-        """Store a render that waits, whose document is that of a batch at a step; its number."""
+        """Store a render that waits, or could not be made, of the document of a batch at a step; its number."""
         with self._database.open() as database, database:
             settings = settings_json(order.settings)
             values = (order.id, order.owner, order.label, order.priority, order.created_at, settings, order.bytes)
-            number = database.execute(
-                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, outcome, "
-                "batch, step) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (*values, outcome.state, outcome.json(), batch, step),
-            ).lastrowid
-        assert number is not None
-        return number
+            database.execute(
+                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, ended_at, "
+                "outcome, batch, step) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO UPDATE "
+                "SET state = excluded.state, ended_at = excluded.ended_at, outcome = excluded.outcome",
+                (*values, outcome.state, outcome.ended_at, outcome.json(), batch, step),
+            )
+            (number,) = database.execute("SELECT number FROM renders WHERE id = ?", (order.id,)).fetchone()
+        return int(number)
 
     def members(self) -> dict[str, tuple[int, int]]:
         """By the ids of renders of batches: the batch's number, and the step."""

@@ -314,7 +314,7 @@ def test_a_batch_ends_whose_renders_cannot_be_made(dies: Any, monkeypatch: pytes
         kept = list[object]()
         renders: Any = type("Renders", (), {"keep": lambda self, batch: kept.append(batch)})()
         batch = batch_queue.Batch(batch_queue.BatchOrder("0" * 32, "", 3, "[]"))
-        batch_queue.BatchQueue(renders, breaks, 1)._begin(batch, None)
+        batch_queue.BatchQueue(renders, breaks, breaks, 1)._begin(batch, None)
         async with asyncio.timeout(10):
             await batch.finished.wait()
         assert batch.state == "cancelled" and kept == [batch]

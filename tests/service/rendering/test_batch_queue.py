@@ -1,0 +1,146 @@
+"""Batches whose renders cannot all be made: the others go on, and the batch ends."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.batches.batch import Batch
+from service.batches.members import Members as RealMembers
+from service.batches.queue import BatchQueue
+from service.config import MIB, Config
+from service.problems import TooLarge, TooManyRequests
+from service.renders.job import Job
+from service.renders.queue import RenderQueue
+from service.renders.store.batch_rows import BatchOrder
+from service.renders.store.record import Order, Outcome
+from service.renders.store.store import RenderStore
+from service.requests.request_parser import folded
+from service.requests.request_reader import RequestReader
+from service.storage.asset_access import NO_USES
+from service.system.turns import CALLER
+from tests.documents import Shelf
+from tests.queues import LIMITS
+from tests.service.rendering.fakes import PACKED, Quick, Renderers, load, until
+from tests.serving import SCENE
+
+RENDERS = 5
+
+
+class Members:
+    """Makes renders, but for one that is too large and one that meets a mistake of the server's."""
+
+    def __init__(self, batch: Batch, renderers: Quick) -> None:
+        self._batch, self._renderers = batch, renderers
+
+    async def check(self) -> None: ...
+
+    async def job(self, step: int, stored: bool) -> Job:
+        if step == 1:
+            raise TooLarge("It never fits.", "/settings/width")
+        if step == RENDERS - 1:
+            raise ZeroDivisionError
+        return Job(self._renderers, self._batch.member(step), load, b"document", PACKED)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_render_that_cannot_be_made_fails_alone(tmp_path: Path, stored: bool) -> None:
+    renderers = Quick()
+    store = RenderStore(tmp_path) if stored else None
+
+    def ended(order: Order, outcome: Outcome) -> Job:
+        return Job(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
+
+    def queue(renders: RenderQueue) -> BatchQueue:
+        members: Any = lambda batch, body: Members(batch, renderers)  # noqa: E731
+        return BatchQueue(renders, members, ended, 2)
+
+    async def scenario() -> None:
+        batches = queue(RenderQueue(LIMITS, store))
+        order = BatchOrder("b" * 32, "anna", RENDERS, '[{"turntable": 5}]', created_at=time.time())
+        batch = await batches.submit(order, b"", NO_USES, None)
+        async with asyncio.timeout(30):
+            await batch.finished.wait()
+        assert [each["state"] for each in batch.status()["renders"]] == ["done", "failed", "done", "done", "failed"]
+        assert (batch.jobs[1].outcome.problem or {})["detail"] == "It never fits."
+        assert "mistake" in (batch.jobs[RENDERS - 1].outcome.problem or {})["detail"]
+        await batches.close()
+
+    asyncio.run(scenario())
+    if store is not None:
+        states = [each.outcome.state for each in store.load()]
+        assert sorted(states) == ["done", "done", "done", "failed", "failed"]
+        assert all(each.outcome.ended_at for each in store.load())
+
+
+def test_a_batch_that_cannot_be_read_ends(tmp_path: Path) -> None:
+    """Of an earlier server, whose document is not there any more."""
+    renderers, store = Quick(), RenderStore(tmp_path)
+    ended = partial(Job, renderers, load=load)
+
+    async def scenario() -> None:
+        order = BatchOrder("b" * 32, "anna", 2, "[]", created_at=time.time())
+        number = await store.insert_batch(order, b"", NO_USES, None)
+        renders = RenderQueue(LIMITS, store)
+        members: Any = None
+        batches = BatchQueue(renders, members, lambda order, outcome: ended(order, outcome=outcome), 2)
+        (batch,) = batches.resume(store.batches.all())
+        store.batches.body = lambda number: None  # type: ignore[method-assign]
+        batches.go_on()
+        async with asyncio.timeout(30):
+            await batch.finished.wait()
+        assert batch.number == number and batch.state == "failed"
+        await batches.close()
+
+    asyncio.run(scenario())
+
+
+def test_documents_of_batches_count_until_the_last_render_is_in_line(tmp_path: Path) -> None:
+    reader = RequestReader(Config(memory=64 * MIB), Shelf())
+    renderers, store = Renderers(), RenderStore(tmp_path)
+    note = {"note": "x" * MIB}  # which nobody reads
+    body = folded({"scene": SCENE | note, "settings": {}})
+
+    def new_job(order: Order, document: bytes | None, packed: Any) -> Job:
+        return Job(renderers, order, load, document, PACKED)  # type: ignore[arg-type]
+
+    def members(batch: Batch, body: bytes) -> RealMembers:
+        made = RealMembers(batch, body, reader, new_job)
+        made.check = no_check  # type: ignore[method-assign]
+        return made
+
+    async def no_check() -> None: ...
+
+    def used() -> int:
+        return reader.memory.used()["documents"]
+
+    async def scenario() -> None:
+        renders = RenderQueue(LIMITS, store)
+        batches = BatchQueue(renders, members, lambda order, outcome: new_job(order, None, None), 2)
+
+        async def submit(id: str, owner: str, count: int) -> Batch:
+            CALLER.set(owner)
+            order = BatchOrder(f"{id:0<32}", owner, count, json.dumps([{"turntable": count}]))
+            return await batches.submit(order, body, NO_USES, None)
+
+        long = await submit("f", "anna", 3)
+        await until(lambda: len(long.jobs) == 2)
+        assert MIB < used() < 1.1 * MIB
+        renders.cancel(long.jobs[0])
+        await until(lambda: len(long.jobs) == 3 and not used())
+        assert not long.finished.is_set()
+        with pytest.raises(TooManyRequests, match="documents of batches"):
+            for i in range(9):
+                await submit(f"{i}", "anna", 9)
+        assert 7 * MIB < used() <= 8 * MIB, "half of a quarter"
+        await submit("b", "bert", 9)
+        await batches.close()
+        await renders.close()
+
+    asyncio.run(scenario())
