@@ -15,6 +15,7 @@ from service.renders.store.record import ENDED, Order, Outcome, State
 from service.scene.settings import Settings
 
 STATES: tuple[State, ...] = ("queued", "running", *ENDED)
+RENDERS_OF_ONE = 10  # renders of a batch that count as one where ended renders are kept
 ID_DIGITS, STEP_DIGITS = 24, 8  # of a render's id: those of its batch, and its place
 
 
@@ -36,6 +37,7 @@ class Batch:
         self.id, self.owner = order.id, order.owner
         self.client = order.owner or order.id  # whose share of the disk its document counts towards
         self.bytes = order.bytes
+        self.counts_as = -(-order.renders // RENDERS_OF_ONE)
         self.jobs: dict[int, Job] = {}  # by step: those that there are
         self.finished = asyncio.Event()
         self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; whoever waits clears it

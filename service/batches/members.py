@@ -14,7 +14,7 @@ from service.quality import ResolvedSettings, resolve
 from service.renders.job import Job
 from service.renders.store.record import Order
 from service.requests.batch_request import variations
-from service.requests.request_parser import folded, unfolded
+from service.requests.request_parser import LONGEST_LABEL, folded, unfolded
 from service.requests.request_reader import RequestReader
 from service.scene.document import Parsed
 from service.scene.settings import Settings
@@ -45,11 +45,10 @@ class Members:
     async def job(self, step: int, stored: bool) -> Job:
         """A render that is ready to be queued. One whose scene cannot be packed says why when its turn comes."""
         document, settings, packed = await packing(partial(self._packed, step), self._batch.client)
-        order = self._batch.order
+        order, label = self._batch.order, self._variations.name(step)[:LONGEST_LABEL]
         member = Order(
-            member_id(self._batch.id, step), order.owner, settings, self._variations.name(step), order.priority,
-            order.created_at,
-        )  # fmt: skip
+            member_id(self._batch.id, step), order.owner, settings, label, order.priority, order.created_at
+        )
         kept = None if stored else await packing(partial(folded, document["scene"]), self._batch.client)
         try:
             return self._new_job(member, kept, packed)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Collection
 from functools import partial
 
-from service.batches.batch import ID_DIGITS, STEP_DIGITS, Batch, member_id
+from service.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, member_id
 from service.batches.members import Members
 from service.problems import MISTAKE, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.renders.job import Job
@@ -47,6 +47,7 @@ class BatchQueue:
         """Store a batch and begin it. Raises what packing its first scene raises; TooManyRequests, Unavailable."""
         self.admit(order.owner)
         batch = Batch(order)
+        self._check_number(batch)
         members = await parsing(partial(self._members, batch, body), batch.client)
         await members.check()
         batch.number = await self._renders.store_batch(batch, order, body, uses, key)
@@ -57,9 +58,22 @@ class BatchQueue:
     def admit(self, owner: str) -> None:
         """Raise what `submit` would raise, before a scene is read for nothing."""
         self._renders.admit(owner)
-        under_way = sum(each.owner == owner and not each.finished.is_set() for each in self._batches.values())
+        under_way = len(self._under_way(owner))
         if under_way >= EACH:
             raise TooManyRequests(f"{under_way} batches of yours are under way: no more than {EACH} may be", RETRY_S)
+
+    def _under_way(self, owner: str) -> list[Batch]:
+        return [each for each in self._batches.values() if each.owner == owner and not each.finished.is_set()]
+
+    def _check_number(self, batch: Batch) -> None:
+        """Raise TooManyRequests where an owner's batches have more renders than are kept once they have ended."""
+        others, kept = self._under_way(batch.owner), self._renders.kept_of_each
+        if others and batch.counts_as + sum(each.counts_as for each in others) > kept:
+            renders, most = sum(each.order.renders for each in others), kept * RENDERS_OF_ONE
+            detail = (
+                f"{renders} renders of your batches are under way, and with these there would be more than {most}"
+            )
+            raise TooManyRequests(f"{detail} (ten times SUNBOX_KEEP_RENDERS)", RETRY_S)
 
     def resume(self, stored: Collection[StoredBatch]) -> list[Batch]:
         """The batches that the store has, which go on with `go_on` once they have their renders."""

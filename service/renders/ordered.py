@@ -29,6 +29,7 @@ class InBatch(Protocol):
     bytes: int  # of that document
     number: int  # of its row in the store
     ended_at: float  # by the monotonic clock
+    counts_as: int  # of the renders of its owner that are kept
     gone: bool  # whether it made room for others, or was deleted
     jobs: dict[int, Any]  # by step
 
@@ -46,6 +47,7 @@ class Ordered:
     recorder: Recorder | None = None
     number = 0  # rises in the order of arrival
     place = 0  # among those of its owner that wait
+    counts_as = 1  # of the renders of its owner that are kept
     waits = False  # for memory, the disk or a renderer, which was logged
     batch: InBatch | None = None  # which has the document, and learns of the end
     task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it

@@ -7,7 +7,7 @@ import contextlib
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 
@@ -26,7 +26,7 @@ from service.renders.slots import Slots
 from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.renders.store.rows import REMEMBERED
-from service.renders.store.store import RenderStore
+from service.renders.store.store import MEMBER_BYTES, RenderStore
 from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.quota import QuotaUsedUp
 from service.system.background import Background
@@ -125,8 +125,9 @@ class RenderQueue:
         self.admit(job.owner)
         if self.store is not None:
             self._storing[job.owner] += 1
+            insert = partial(self.store.insert_member, job.order, job.outcome, batch.number, step)
             try:
-                job.number = await self.store.insert_member(job.order, job.outcome, batch.number, step)
+                job.number = await self._make_room_for(insert, MEMBER_BYTES)
             finally:
                 self._storing[job.owner] -= 1
             whole = job.finished.is_set()
@@ -212,6 +213,11 @@ class RenderQueue:
     def kept(self) -> int:
         return len(self._kept)
 
+    @property
+    def kept_of_each(self) -> int:
+        """How many ended renders of one owner are kept."""
+        return self._limits.retention.kept
+
     @contextmanager
     def looking(self, job: Job) -> Iterator[None]:
         """Somebody looks at a render's picture: it stays with the renderer for a while."""
@@ -251,22 +257,28 @@ class RenderQueue:
             self._storing[job.owner] -= 1
 
     async def _insert(self, job: Job, uses: AllowedUses, key: IdempotencyKey | None) -> int:
-        """Where there is no room, ended renders make some, and at last there is a reserve for owners of few bytes."""
+        """Where nothing makes room, there is a reserve for owners of few bytes at last."""
         assert self.store is not None
         scene = job.scene
         assert scene.document is not None
         insert = partial(
             self.store.insert, job.order, job.outcome, scene.document, uses, key, patch=scene.patch, base=scene.base
         )
-        missing = job.order.bytes
+        try:
+            return await self._make_room_for(insert, job.order.bytes)
+        except QuotaUsedUp:
+            if self._documents.take_reserve(job, job.order.bytes):
+                return await insert(reserved=True)
+            raise
+
+    async def _make_room_for(self, insert: Callable[[], Awaitable[int]], missing: int) -> int:
+        """What `insert` gives, for which ended renders make room. Raises QuotaUsedUp where there are none."""
         while True:
             try:
                 return await insert()
             except QuotaUsedUp:
                 goes, missing = self._kept.take_for(missing), 2 * missing
                 if not goes:
-                    if self._documents.take_reserve(job, job.order.bytes):
-                        return await insert(reserved=True)
                     raise
                 await self._forget(self._drop(goes))
 
@@ -312,7 +324,7 @@ class RenderQueue:
             return 0
         self._documents.take(batch, order.bytes)
         try:
-            return await self.store.insert_batch(order, body, uses, key)
+            return await self._make_room_for(partial(self.store.insert_batch, order, body, uses, key), order.bytes)
         except BaseException:
             self._documents.release(batch)
             raise

@@ -11,7 +11,7 @@ from typing import Generic, Protocol, TypeVar
 class Retention:
     """Which of the ended renders are kept."""
 
-    kept: int  # renders of each owner
+    kept: int  # renders of each owner, of those of batches ten times as many
     kept_bytes: int  # of the pictures and documents of all of them
     kept_s: float  # after a render's end
 
@@ -38,6 +38,10 @@ class Ended(Protocol):
     @property
     def size(self) -> int: ...
 
+    @property
+    def counts_as(self) -> int:
+        """Of the renders of its owner that are kept, how many it is."""
+
 
 T = TypeVar("T", bound=Ended)
 
@@ -49,6 +53,7 @@ class KeptRenders(Generic[T]):
         self._bounds = bounds
         self._lines: dict[str, dict[T, int]] = {}  # sizes by owner, the oldest end first
         self._bytes: Counter[str] = Counter()
+        self._renders: Counter[str] = Counter()
         self._count = 0
         self._newest: T | None = None
 
@@ -62,6 +67,7 @@ class KeptRenders(Generic[T]):
         if render not in line:
             self._newest = render
             self._count += 1
+            self._renders[render.owner] += render.counts_as
         self._bytes[render.owner] += render.size - line.get(render, 0)
         line[render] = render.size
 
@@ -71,16 +77,18 @@ class KeptRenders(Generic[T]):
             self._count -= 1
             self._newest = None if self._newest is render else self._newest
             self._bytes[render.owner] -= line.pop(render)
+            self._renders[render.owner] -= render.counts_as
             if not line:
-                del self._lines[render.owner], self._bytes[render.owner]
+                del self._lines[render.owner], self._bytes[render.owner], self._renders[render.owner]
 
     def take_superfluous(self, now: float) -> list[T]:
-        """Remove those to forget, by `now`. The newest one stays, however large it is, until it is old."""
+        """Remove those to forget, by `now`. The newest one, and an owner's only one, stay until they are old, however
+        large they are."""
         goes, bounds = list[T](), self._bounds
-        for line in list(self._lines.values()):
+        for owner, line in list(self._lines.items()):
             while line and now - (first := next(iter(line))).ended_at >= bounds.kept_s:
                 goes.append(self._take(first))
-            while len(line) > bounds.kept:
+            while len(line) > 1 and self._renders[owner] > bounds.kept:
                 goes.append(self._take(next(iter(line))))
         return goes + self._take_largest(self._bytes.total() - bounds.kept_bytes)
 

@@ -43,6 +43,7 @@ log = logging.getLogger(__name__)
 
 RETRY_S = 30
 MAKING = ".batch-"  # how the names of folders begin in which files of several pictures are made
+MEMBER_BYTES = 4096  # of the row of a render of a batch, once it has ended
 LARGE = 16 << 20  # bytes of a picture, which take 0.1 s of a middling disk
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -165,7 +166,12 @@ class RenderStore:
 
     async def insert_member(self, order: Order, outcome: Outcome, batch: int, step: int) -> int:
         """The number of a render of a batch that waits from now on, and is on the disk."""
-        return await recording(partial(self._rows.insert_member, order, outcome, batch, step))
+
+        def insert() -> int:
+            with self._room(expected([MEMBER_BYTES])):
+                return self._rows.insert_member(order, outcome, batch, step)
+
+        return await recording(insert)
 
     def members(self) -> dict[str, tuple[int, int]]:
         """By the ids of renders of batches: the batch's number, and the step. Not for an event loop."""

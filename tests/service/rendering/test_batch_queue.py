@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -144,3 +145,35 @@ def test_documents_of_batches_count_until_the_last_render_is_in_line(tmp_path: P
         await renders.close()
 
     asyncio.run(scenario())
+
+
+def test_batches_under_way_have_no_more_renders_than_are_kept(tmp_path: Path) -> None:
+    renderers = Renderers()
+
+    async def scenario() -> None:
+        limits = replace(LIMITS, retention=replace(LIMITS.retention, kept=3))
+        renders = RenderQueue(limits, RenderStore(tmp_path))
+        members: Any = lambda batch, body: Members(batch, renderers)  # noqa: E731
+        batches = BatchQueue(renders, members, lambda order, outcome: Job(renderers, order, load), 2)  # type: ignore[arg-type]
+
+        async def submit(id: str, owner: str, count: int) -> None:
+            order = BatchOrder(f"{id:0<32}", owner, count, json.dumps([{"turntable": count}]))
+            await batches.submit(order, b"", NO_USES, None)
+
+        await submit("a", "anna", 20)
+        with pytest.raises(TooManyRequests, match=r"more than 30 .*SUNBOX_KEEP_RENDERS"):
+            await submit("b", "anna", 11)
+        await submit("c", "anna", 10)
+        await submit("d", "bert", 100)
+        await batches.close()
+        await renders.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_label_has_no_more_characters_than_a_request_s(tmp_path: Path) -> None:
+    axes = [{"path": "/shapes", "values": ["x" * 60]}] * 8
+    order = BatchOrder("a" * 32, "anna", 1, json.dumps(axes))
+    reader = RequestReader(Config(), Shelf())
+    made = RealMembers(Batch(order), folded({"scene": SCENE, "settings": {}}), reader, lambda order, *_: order)  # type: ignore[arg-type,return-value]
+    assert len(asyncio.run(made.job(0, True)).label) == 200  # type: ignore[attr-defined]

@@ -24,14 +24,14 @@ class Job:
     batch = None
 
     def __init__(self, id: str, owner: str = "", size: int = 1, priority: int = 0, label: str | None = None) -> None:
-        self.id, self.owner, self.size, self.ended_at = id, owner, size, 0.0
+        self.id, self.owner, self.size, self.ended_at, self.counts_as = id, owner, size, 0.0, 1
         self.order = SimpleNamespace(label=label, bytes=0)
         self.client = owner or id
         self.priority, self.began, self.number, self.resident_bytes = priority, False, 0, 0
         self.state, self.recorder, self.lasting, self.shown = "queued", None, True, False
         self.place, self.memory_share, self.lacks, self.can_give_way = 0, 0.0, 0, False
         self.finished, self.released, self.packed = asyncio.Event(), False, True
-        self.changes = Changes[Any]()
+        self.changes, self.rendering = Changes[Any](), SimpleNamespace(died=None)
 
     async def run(self) -> None:
         self.state = "running"

@@ -32,6 +32,7 @@ from tests.service.rendering.fakes import SETTINGS, Renderers, load
 
 class Ended:
     looks = 0  # at any of them
+    counts_as = 1
 
     def __init__(self, owner: str, ended_at: float, size: int = 1) -> None:
         self.owner, self._ended_at, self._size = owner, ended_at, size
@@ -70,6 +71,21 @@ def test_old_ones_and_those_of_the_owner_of_most_bytes_go() -> None:
     assert kept.take_for(1000) == []  # the newest stays
     kept.remove(large[2])
     assert kept.left_s(0.0) is None and len(kept) == 0
+
+
+def test_renders_of_batches_count_too() -> None:
+    kept: KeptRenders[Ended] = KeptRenders(Retention(kept=10, kept_bytes=100, kept_s=100.0))
+    single, *batches = Ended("a", 1.0), *(Ended("a", 2.0 + i) for i in range(3)), Ended("b", 9.0)
+    for each, count in zip(batches, (4, 6, 12, 1000), strict=True):
+        each.counts_as = count
+    for each in (single, *batches[:2]):
+        kept.add(each)
+    assert kept.take_superfluous(5.0) == [single]
+    kept.add(batches[2])
+    kept.add(batches[3])
+    assert kept.take_superfluous(5.0) == batches[:2], "an owner's last one stays, however many it has"
+    kept.remove(batches[2])
+    assert len(kept) == 1
 
 
 def test_documents_that_wait_are_divided_among_the_keys() -> None:
