@@ -41,6 +41,13 @@ class InBatch(Protocol):
     def ended(self, render: Any) -> None: ...
 
 
+class KeepsPictures(Protocol):
+    """Where pictures that a renderer has are registered, so that they make room when memory is needed."""
+
+    def add(self, render: Any) -> None:
+        """Somebody has looked at a render's picture, or it has ended."""
+
+
 class Ordered:
     """A render as it stands in line. What a renderer has of it is for Rendering and PictureViewer."""
 
@@ -50,6 +57,7 @@ class Ordered:
     counts_as = 1  # of the renders of its owner that are kept
     waits = False  # for memory, the disk or a renderer, which was logged
     batch: InBatch | None = None  # which has the document, and learns of the end
+    resting: KeepsPictures | None = None  # None: whoever asked for it releases it
     task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it
 
     def __init__(self, renderers: Renderers, order: Order, life: Life, scene: RenderScene) -> None:

@@ -16,7 +16,6 @@ from service.renders import listing
 from service.renders.documents import WaitingDocuments
 from service.renders.followers import Follower, Followers
 from service.renders.job import Job
-from service.renders.life import PictureAt
 from service.renders.ordered import InBatch
 from service.renders.recorder import Recorder
 from service.renders.resting import Resting
@@ -81,7 +80,7 @@ class RenderQueue:
             job.number = self._number = each.number
             whole = each.outcome.state in ENDED
             job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers, job.owner)
-            self._jobs[job.id] = job
+            self._know(job)
             if (place := (members or {}).get(job.id)) is not None:
                 known[place[0]].add(place[1], job)
             else:
@@ -112,7 +111,7 @@ class RenderQueue:
             job.scene.document = job.scene.patch = None
         if listed:
             self._number = job.number = max(job.number, self._number + 1)
-            self._jobs[job.id] = job
+            self._know(job)
             job.changes.followers = self._followers
             job.changes.tell(job)
         self._slots.add(job)
@@ -137,7 +136,7 @@ class RenderQueue:
     def take_member(self, job: Job, batch: InBatch, step: int) -> None:
         """A render of a batch is there, and waits if it has not ended."""
         self._number = job.number = max(job.number, self._number + 1)
-        self._jobs[job.id] = job
+        self._know(job)
         batch.add(step, job)
         if not job.finished.is_set():
             self._slots.add(job)
@@ -218,14 +217,10 @@ class RenderQueue:
         """How many ended renders of one owner are kept."""
         return self._limits.retention.kept
 
-    @contextmanager
-    def looking(self, job: Job) -> Iterator[None]:
-        """Somebody looks at a render's picture: it stays with the renderer for a while."""
-        try:
-            yield
-        finally:
-            if job.finished.is_set() or job.picture_at is PictureAt.BOTH:
-                self.resting.add(job)
+    def _know(self, job: Job) -> None:
+        """Find it by its id from now on, and its picture where memory is taken from."""
+        self._jobs[job.id] = job
+        job.resting = self.resting
 
     async def close(self) -> None:
         """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""

@@ -22,15 +22,21 @@ class Resting:
         self._renders: OrderedDict[str, Job] = OrderedDict()  # the last one looked at last
         self._loop: asyncio.AbstractEventLoop | None = None
 
+    @property
+    def bytes(self) -> int:
+        """About the memory that they take."""
+        return sum(each.resident_bytes for each in self._renders.values() if _rests(each))
+
     def add(self, job: Job) -> None:
-        """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
+        """Keep a render that has ended, or waits, with the renderer if it is there, and let others go that have not
+        been looked at for longer."""
         self._loop = asyncio.get_running_loop()
         self._renders.pop(job.id, None)
         self._renders[job.id] = job
         for each in list(self._renders.values()):
-            if not each.finished.is_set() and each.picture_at is not PictureAt.BOTH:
-                del self._renders[each.id]  # it waited, and runs by now
-        total = sum(each.resident_bytes for each in self._renders.values())
+            if not _rests(each):
+                del self._renders[each.id]
+        total = self.bytes
         for each in list(self._renders.values())[:-1]:
             if total <= RESTING_BYTES:
                 break
@@ -66,3 +72,8 @@ class Resting:
             if job.rest():
                 size -= freed
                 del self._renders[job.id]
+
+
+def _rests(job: Job) -> bool:
+    """Whether a renderer has its picture and adds nothing to it: it ended, or it gave way and was looked at."""
+    return job.resident_bytes > 0 and (job.finished.is_set() or job.picture_at is PictureAt.BOTH)

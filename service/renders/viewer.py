@@ -38,7 +38,10 @@ class PictureViewer(Listener):
         return bool(self._reads or self._waiting)
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
-        """The picture so far. Raises Conflict before the first sample, and the error of `refuse`."""
+        """The picture so far. Raises Conflict before the first sample, and the error of `refuse`.
+
+        A picture that this brings back into memory is registered here as one that can leave it again.
+        """
         if self._error is not None:
             raise self._error
         self._waiting += 1
@@ -50,6 +53,8 @@ class PictureViewer(Listener):
             image = await self._reads.ask(view, task, self._render.renderers.send)
         finally:
             self._waiting -= 1
+            if not self._waiting and self._render.resting is not None:
+                self._render.resting.add(self._render)
         if image.pixels is None:
             raise Conflict("There is no sample yet.")
         return image.pixels, image.progress

@@ -159,14 +159,12 @@ class _Sides:
 
     async def _render(self, id: str) -> Still:
         """A render's picture so far. Raises NotFound, Gone, Conflict, InvalidDocument."""
-        renders = self.state.render_queue
-        job = renders.get(id, self.owner)
+        job = self.state.render_queue.get(id, self.owner)
         settings = job.order.settings
         check_pixels(settings.render_width, settings.render_height)
         if settings.denoise:
             raise _denoised()
-        with renders.looking(job):
-            return Still(await _estimate(job), settings.seed, ways_of(settings))
+        return Still(await _estimate(job), settings.seed, ways_of(settings))
 
     async def _asset(self, id: str) -> Still:
         """An EXR file of ours. Raises NotFound, AssetError, InvalidDocument."""

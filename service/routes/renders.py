@@ -197,7 +197,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
         batch, step = place
         return JSONResponse(batch.waiting_status(step))
     job = renders.get(id, owner_of(request))
-    with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
+    with waiting.place(request) if wait else contextlib.nullcontext():
         if wait and not await waiting.until(request, job.life.over.wait(), wait):
             return Response(status_code=GONE)
     return JSONResponse(job.status(kernel=kernel))
@@ -239,8 +239,7 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
     job = _render(request, id)
-    with app_state(request).render_queue.looking(job):
-        return await _image(request, job, query)
+    return await _image(request, job, query)
 
 
 @router.delete(

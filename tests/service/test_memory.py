@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import json
 import os
 from collections.abc import Iterator
 from contextvars import copy_context
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import pytest
 from starlette.requests import Request
 
 from gpu import context
+from service.app import create_app
 from service.assets import AssetStore, ImageData
 from service.assets.cache import ParsedCache
 from service.assets.types import AssetLimits
@@ -301,3 +304,63 @@ def test_renders_wait_for_memory(tight: Server) -> None:
     assert pictures() == stream + each
     for id in (first, second):  # from the disk, one after the other
         assert tight.http.get(f"/v1/renders/{id}/image").status_code == 200
+
+
+# How each call that answers with pictures shows renders of a batch, {last} being the one after {first}: the path and
+# the body, or None where the picture is of no render that is kept.
+SHOWS: dict[str, tuple[str, Any] | None] = {
+    "GET /v1/renders/{id}/image": ("/v1/renders/{last}/image?format=npy", None),
+    "GET /v1/batches/{id}/images.zip": ("/v1/batches/{batch}/images.zip?format=npy", None),
+    "GET /v1/batches/{id}/sheet": ("/v1/batches/{batch}/sheet?width=16", None),
+    "GET /v1/batches/{id}/animation": ("/v1/batches/{batch}/animation?format=gif&width=16", None),
+    "POST /v1/compare": ("/v1/compare?format=png", {"a": "{first}", "b": "{last}"}),
+    "POST /v1/render": None,
+    "POST /v1/export": None,
+    "GET /v1/assets/{id}": None,
+}
+PICTURES = ("image/", "video/", "application/zip", "application/octet-stream")
+
+
+def shows_pictures() -> set[str]:
+    """The calls whose answers may have a picture, by the API's description."""
+    return {
+        f"{method.upper()} {path}"
+        for path, methods in create_app(Config()).openapi()["paths"].items()
+        for method, call in methods.items()
+        for answer in call["responses"].values()
+        if any(mime.startswith(PICTURES) for mime in answer.get("content", {}))
+    }
+
+
+def _named(value: Any, **names: str) -> Any:
+    """A JSON value with names in the places of {name}."""
+    text = json.dumps(value)
+    for name, meant in names.items():
+        text = text.replace(f"{{{name}}}", meant)
+    return json.loads(text)
+
+
+def test_pictures_that_are_shown_make_room(tight: Server) -> None:
+    """By each call that shows them, more than fit into the memory; then another render takes most of it."""
+    assert shows_pictures() == SHOWS.keys(), "a call that shows pictures is asked here, too"
+    size, count, each = 260, 7, RENDERED_PIXEL_BYTES + SAVED_PIXEL_BYTES
+    assert (count - 1) * size**2 * each > 96 * MIB
+    settings = {"width": size, "height": size, "max_samples": 2}
+    body = {"scene": SCENE, "settings": settings, "over": [{"turntable": count}]}
+    batch = tight.http.post("/v1/batches", json=body).json()["id"]
+    found = tight.http.get(f"/v1/batches/{batch}?wait={PATIENCE_S}").json()
+    assert found["state"] == "done"
+    ids = [render["id"] for render in found["renders"]]
+    for asked in filter(None, SHOWS.values()):
+        for first, last in pairwise(ids):
+            path, sent = (_named(part, first=first, last=last, batch=batch) for part in asked)
+            answer = tight.http.get(path) if sent is None else tight.http.post(path, json=sent)
+            assert answer.status_code == 200, (asked, answer.text)
+            if "{last}" not in str(asked):
+                break  # it shows all of them
+        resting = metrics(tight)["sunbox_resting_bytes"]
+        assert 0 < resting <= sum(tight.http.get("/v1/info").json()["memory"]["used"].values()) <= 96 * MIB
+        large = {"width": 500, "height": 500, "max_samples": 1}
+        answer = tight.http.post("/v1/render", json={"scene": SCENE, "settings": large})
+        assert answer.status_code == 200, (asked, answer.text)
+        assert metrics(tight)["sunbox_resting_bytes"] <= 96 * MIB - 500**2 * each < resting

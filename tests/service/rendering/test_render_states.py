@@ -211,8 +211,7 @@ class RenderMachine(RuleBasedStateMachine):
     def is_looked_at(self) -> None:
         async def look() -> int | ServiceError:
             try:
-                with self.queue.looking(self.job):
-                    return (await asyncio.wait_for(self.job.image(View()), 5.0))[1].samples
+                return (await asyncio.wait_for(self.job.image(View()), 5.0))[1].samples
             except ServiceError as error:
                 return error
 
