@@ -10,15 +10,14 @@ import threading
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from service.config import MIB, Config
 from service.ipc import channel
-from service.problems import ServiceError, TooLarge, Unavailable
-from service.requests.export_request import ParsedExport
+from service.problems import FieldError, ServiceError, TooLarge, Unavailable
 from service.requests.parser_child import Failed, Work
-from service.requests.parsers import Kind
-from service.requests.request_parser import ParsedRequest
+from service.requests.parsers import Kind, answer_classes
 from service.scene import MeshShape, Scene
 from service.scene.text import most_bytes
 from service.system.child_processes import Child, Children, Closed
@@ -28,17 +27,8 @@ from service.system.memory import MemoryBudget
 BODIES = 1000  # for one child
 SECONDS_PER_BYTE = 0.25 / MIB  # twice what the slowest body there is was seen to take
 
-# What an answer is made of: the modules of its classes, and numpy's own functions for arrays.
-ANSWERS = {
-    "service.storage.documents",
-    "service.problems",
-    "service.quality",
-    "service.requests.batch_request",
-    "service.requests.bsdf_request",
-    "service.requests.export_request",
-    "service.requests.parser_child",
-    "service.requests.request_parser",
-}
+# What an answer is made of besides the models of documents: classes, and numpy's own functions for arrays.
+ANSWERS = answer_classes() | {Failed, FieldError}
 ARRAYS = {("numpy", "dtype"), ("numpy._core.numeric", "_frombuffer"), ("numpy.core.numeric", "_frombuffer")}
 
 log = logging.getLogger(__name__)
@@ -135,20 +125,33 @@ def allowed(module: str, name: str) -> Any:
     arrays of numbers. Whoever took over the parser cannot name a function. Raises UnpicklingError."""
     if (module, name) in ARRAYS:
         return getattr(importlib.import_module(module), name)
-    if module in ANSWERS or module.startswith("service.scene."):
+    if module.startswith("service."):
         found = getattr(importlib.import_module(module), name, None)
-        if isinstance(found, type) and found.__module__ == module:
+        if isinstance(found, type) and found.__module__ == module and _is_of_answers(found):
             return found
     raise pickle.UnpicklingError(f"{module}.{name} is no part of an answer")
 
 
+def _is_of_answers(found: type) -> bool:
+    return found in ANSWERS or found.__module__.startswith("service.scene.") or issubclass(found, ServiceError)
+
+
 def _believed(answer: Any) -> Any:
     """The answer. Its meshes are looked at again: compiled code reads the vertices that faces name."""
-    scene = answer.scene if isinstance(answer, ParsedRequest | ParsedExport) else answer
-    for shape in scene.shapes if isinstance(scene, Scene) else ():
-        if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
-            raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")
+    for scene in _scenes(answer):
+        for shape in scene.shapes:
+            if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
+                raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")
     return answer
+
+
+def _scenes(answer: Any) -> Iterator[Scene]:
+    """All scenes in an answer."""
+    if isinstance(answer, Scene):
+        yield answer
+    elif is_dataclass(answer):
+        for field in fields(answer):
+            yield from _scenes(getattr(answer, field.name))
 
 
 def _death(child: Child, work: Work) -> Exception:
