@@ -14,7 +14,7 @@ from service.worker.scheduler import Account
 
 
 class BsdfTask:
-    """Evaluated in slices. Where others would have to wait for its kernel, a helper compiles that first."""
+    """Evaluated in slices. A helper compiles its kernel first."""
 
     attempted = 0  # there are no generations
     wanted = False  # there are no frames
@@ -33,10 +33,6 @@ class BsdfTask:
     @property
     def ready(self) -> bool:
         return not self._ended and not self._wait.compiling
-
-    @property
-    def awaited(self) -> bool:
-        return not self._ended
 
     @property
     def unseen(self) -> bool:

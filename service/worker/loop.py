@@ -43,8 +43,9 @@ from service.worker.task import Task
 Turns = Task | Assistant | BsdfTask  # what has turns
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
-# No hang: some drivers take this long for a kernel with every feature. Those of GPUs take most.
-COMPILING_S = {True: 60.0, False: 300.0}  # by whether the device is the processor
+# No hang: a driver may take this long for a kernel with every feature. The renderer compiles none where a process
+# can; but the driver may have dropped what that compiled.
+COMPILING_S = 300.0
 
 log = logging.getLogger(__name__)
 
@@ -75,8 +76,7 @@ class Loop:
         )
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
-        self._compiling_s = COMPILING_S[renderer.info["software"]]
-        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline, foresees)
+        self._compiler = CompileClient(renderer.info, device, lifeline, foresees)
         self._context = WorkerContext(
             renderer,
             self._send,
@@ -95,24 +95,31 @@ class Loop:
 
     def run(self) -> None:
         """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
-        busy = False
         self._compiler.prepare(kernel_keys.common_keys(), "soon")
+        busy = False
         while True:
-            for message in coalesced(self._pending(wait=not busy)):
-                self.handlers[type(message)](message)
-            self._denoiser.hear()
-            self._compiler.hear()
-            chosen = self._scheduler.choose(self._everyone)
-            if chosen is not None:
-                began = time.monotonic()
-                self._work(chosen, chosen.turn)
-                self._heartbeat.lasted(time.monotonic() - began)
-            for task in list(self._tasks.values()):
-                if task.wanted:
-                    self._work(task, partial(self._answer, task))
-            busy = any(each.ready for each in self._everyone)
-            self._account(at_once=not busy)
-            busy = self._foreseen.prepare(idle=not busy) or busy
+            busy = self.step(wait=not busy)
+
+    def step(self, wait: bool) -> bool:
+        """One round: messages, a turn, frames; whether there is more to do at once. With `wait` it first sleeps until
+        there is a reason for it."""
+        for message in coalesced(self._pending(wait)):
+            self._take(message)
+        self._denoiser.hear()
+        self._compiler.hear()
+        chosen = self._scheduler.choose(self._everyone)
+        if chosen is not None:
+            began = time.monotonic()
+            self._work(chosen, chosen.turn)
+            self._heartbeat.lasted(time.monotonic() - began)
+        for task in list(self._tasks.values()):
+            for message in task.settled():
+                self._take(message)
+            if task.wanted:
+                self._work(task, partial(self._answer, task))
+        busy = any(each.ready for each in self._everyone)
+        self._account(at_once=not busy)
+        return self._foreseen.prepare(idle=not busy) or busy
 
     @property
     def _everyone(self) -> list[Turns]:
@@ -134,6 +141,11 @@ class Loop:
         except BlockingIOError:
             return
 
+    def _take(self, message: ToRenderer) -> None:
+        task = self._tasks.get(message.task)
+        if task is None or not task.defers(message):
+            self.handlers[type(message)](message)
+
     def _answer(self, task: Task) -> None:
         if task.answer():
             self._scheduler.shown(task)
@@ -141,14 +153,12 @@ class Loop:
     def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
         """Do the work and charge the task's client for its time. An exception fails this task only."""
         began = time.perf_counter()
-        with self._heartbeat.working(task.number, self._compiling_s if task.loads else 0.0):
+        compiles = task.loads or not self._compiler.able
+        with self._heartbeat.working(task.number, COMPILING_S if compiles else 0.0):
             self._guard(task, work, read)
         seconds = time.perf_counter() - began
         self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
-
-    def _crowded(self) -> bool:
-        return sum(each.awaited for each in self._everyone) > 1
 
     def _account(self, at_once: bool) -> None:
         """Report the GPU time that was used, now and then, and at once before the loop sleeps."""
@@ -179,7 +189,7 @@ class Loop:
             Assistants: work(lambda task, message: task.picture.home.assist(message.ids)),
             LeaseDone: work(lambda task, message: task.picture.home.heard(message)),
             Restore: work(lambda task, message: task.picture.restore(message)),
-            Settle: work(lambda task, _: task.picture.settle()),
+            Settle: note(lambda task, _: None),  # nothing is left to be applied: else the task had kept it
             Stop: work(lambda task, _: task.picture.stop()),
             Want: note(lambda task, message: task.picture.look(message)),
             TakeCheckpoint: note(lambda task, _: task.picture.ending.checkpoints.hasten()),

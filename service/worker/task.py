@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from service.ipc.messages import Update
+from service.ipc.messages import Restore, ToRenderer, Update
+from service.ipc.task_control import Drop, Settle
 from service.worker.context import WorkerContext
 from service.worker.scheduler import Account
 from service.worker.task_picture import Phase, TaskPicture
@@ -20,6 +21,7 @@ class Task:
         self.number, self.client = number, client
         self.account = Account()
         self.picture = TaskPicture(context, number, client, self)
+        self._later: list[ToRenderer] = []  # behind the pending update
         self._paused = self._away = False
         self._held_until = 0.0  # by the monotonic clock
 
@@ -42,7 +44,7 @@ class Task:
     def ready(self) -> bool:
         """Whether a turn would do anything."""
         picture, phase = self.picture, self.picture.phase
-        if self._away or phase is Phase.EMPTY:
+        if (self._away and not self._later) or phase is Phase.EMPTY:
             return False
         if phase is Phase.COMPILING:
             return picture.updates.preview.due and not self._paused
@@ -60,14 +62,6 @@ class Task:
     def loads(self) -> bool:
         """Whether its next turn may take as long as a compilation does."""
         return self.picture.loads
-
-    @property
-    def awaited(self) -> bool:
-        """Whether a stall of the loop would be noticed: there is work, or a person who may edit at any moment."""
-        picture = self.picture
-        if picture.loads:
-            return True
-        return picture.residency.there and not self._away and (picture.tracker.interactive or self.ready)
 
     @property
     def idle(self) -> bool:
@@ -101,6 +95,23 @@ class Task:
         """Take an update, which the next turn applies together with others that wait."""
         self._held_until = 0.0
         self.picture.updates.join(update)
+
+    def defers(self, message: ToRenderer) -> bool:
+        """Whether the task keeps the message until the pending update is applied, for which its kernel may have to be
+        compiled first: one that asks for that, and those behind it, but for the last."""
+        if isinstance(message, Drop):
+            return False
+        waits = isinstance(message, Settle | Restore) and self.picture.updates.pending is not None
+        if waits or self._later:
+            self._later.append(message)
+        return bool(self._later)
+
+    def settled(self) -> list[ToRenderer]:
+        """The messages that were deferred, in order, once the pending update is applied."""
+        if not self._later or self.picture.updates.pending is not None:
+            return []
+        messages, self._later = self._later, []
+        return messages
 
     def turn(self) -> None:
         """Do the next step of the picture."""

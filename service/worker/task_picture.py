@@ -187,6 +187,7 @@ class TaskPicture:
         assert settings is not None  # a task's first update has them
         self._keep(update)
         try:
+            updates.check()
             made = residency.change(update, edited, settings)
         except GpuError as error:
             fallback = self.tracker.generation if residency.there else None
@@ -231,14 +232,8 @@ class TaskPicture:
         else:
             self.residency.offload()
 
-    def settle(self) -> None:
-        """Apply the pending update now, so that the next one can fall back to it."""
-        if self.updates.pending is not None:
-            self._apply(self.updates.pending)
-
     def restore(self, restore: Restore) -> None:
         """Go on with a saved picture of the scene, unless another driver or version saved it."""
-        self.settle()
         if self.residency.loaded is None:
             return
         tracker, full = self.tracker, self.residency.full

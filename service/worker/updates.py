@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gpu import RenderSettings
+from gpu import CompileError, RenderSettings
 from gpu.precompile import kernel_keys
 from service.ipc.messages import Update
 from service.worker.context import WorkerContext
@@ -33,6 +33,7 @@ class Updates:
         # Of the pending update, once it was looked at.
         self._edited: EditedScene | None = None
         self._request: KernelRequest | None = None
+        self._refusal: CompileError | None = None
 
     @property
     def compiling(self) -> bool:
@@ -50,7 +51,7 @@ class Updates:
         if update.base is not None and update.base != known:
             return
         self.pending = self.pending.then(update) if self.pending is not None else update
-        self._edited = self._request = None
+        self._edited = self._request = self._refusal = None
         self.stops = False
         self._wait.stop()
 
@@ -61,8 +62,9 @@ class Updates:
         return self._edited
 
     def begin_to_wait(self, update: Update, paused: bool) -> bool:
-        """Whether the update's kernel is being compiled, so that the update has to wait for it."""
-        self._request = None
+        """Whether the update's kernel is being compiled, so that the update has to wait for it. Where it cannot be,
+        `check` says so."""
+        self._request = self._refusal = None
         if self._wait.compiler is None:
             return False
         loaded = self._residency.loaded is not None
@@ -71,13 +73,22 @@ class Updates:
         if request is None:
             return False
         watched = (update.interactive or self._tracker.interactive) and not paused
-        return any(self._waits_for(key, request, update.generation, watched) for key in request.keys)
+        try:
+            return any(self._waits_for(key, request, update.generation, watched) for key in request.keys)
+        except CompileError as error:
+            self._refusal = error
+            return False
+
+    def check(self) -> None:
+        """Raise the CompileError of the pending update's kernel, if there is none for it."""
+        if self._refusal is not None:
+            raise self._refusal
 
     def _waits_for(self, key: KernelKey, request: KernelRequest, generation: int, watched: bool) -> bool:
         """Whether this kernel is being compiled, which may be shown by another one meanwhile."""
         assert self._wait.compiler is not None
         shows = watched and not self._wait.compiler.knows(key) and self.preview.can(request)
-        if not self._wait.begin(key, shows):
+        if not self._wait.begin(key):
             return False
         if not shows:
             self.preview.release()
@@ -91,7 +102,7 @@ class Updates:
         if self._request is not None and self._tracker.generation == update.generation:
             for key in self._request.keys:
                 self._wait.met(key)
-        self._edited = self._request = None
+        self._edited = self._request = self._refusal = None
 
     def take_compile_ms(self) -> float:
         """Milliseconds that the kernel of the last update took to compile elsewhere; 0 when asked again."""

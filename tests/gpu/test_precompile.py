@@ -20,7 +20,8 @@ from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.renderers.local.supervisor import Supervisor
 from service.worker.device.loaded_scene import LoadedScene, edited_scene, kernel_request
-from service.worker.helpers.compile_client import SPARE_AFTER_S, CompileClient, Compiled, Priority, records
+from service.worker.helpers.compile_client import SPARE_AFTER_S, CompileClient, Priority, records
+from service.worker.helpers.compile_lane import Compiled
 from service.worker.helpers.compile_main import LOCKS
 from tests.serving import PATIENCE_S, wait_until
 from tests.supervisors import LINEAR, SCENES, SIZE, Ears, compile_helpers, with_supervisor
@@ -161,7 +162,7 @@ def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
     back.release()
 
 
-def test_a_helper_that_dies_is_done_without(gpu: Renderer, arrays: Any, cold: Path) -> None:
+def test_a_kernel_whose_compiler_is_killed_is_begun_again(gpu: Renderer, arrays: Any, cold: Path) -> None:
     async def test(supervisor: Supervisor) -> None:
         _, pixels = await beside(supervisor, arrays, kill=True)
         assert np.array_equal(pixels, in_the_loop(gpu, arrays))
@@ -201,7 +202,7 @@ class Instant:
 
 
 def compiling_instantly(gpu: Renderer, priority: Priority) -> tuple[CompileClient, Instant]:
-    compiler, helper = CompileClient(gpu.info, None, lambda: True), Instant()
+    compiler, helper = CompileClient(gpu.info, None), Instant()
     compiler._lanes[priority].helper = helper  # type: ignore[assignment]
     return compiler, helper
 

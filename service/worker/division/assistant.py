@@ -50,10 +50,6 @@ class Assistant:
         return self._updates.pending is not None
 
     @property
-    def awaited(self) -> bool:
-        return self.ready
-
-    @property
     def idle(self) -> bool:
         """Whether its memory on the device may be taken."""
         return self._residency.loaded is not None and not self.ready
@@ -102,6 +98,7 @@ class Assistant:
             return  # its first one failed, which was said
         settings = RenderSettings(**update.settings) if update.settings is not None else self._updates.settings
         assert settings is not None  # the first update has them
+        self._updates.check()
         made = self._residency.change(update, edited, settings)
         if made is not None:
             self._residency.release()

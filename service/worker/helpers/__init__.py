@@ -2,6 +2,7 @@
 
 process         one such process, started on demand
 compile_client  asks for kernels to be compiled, and knows which are
+compile_lane    the line of one priority, and what becomes of its kernels
 kernel_wait     one kernel that a task waits for
 compile_main    compiles kernels: `python -m service.worker.helpers.compile_main`
 denoise_client  asks for pictures to be denoised

@@ -1,4 +1,8 @@
-"""The renderer's side of the processes that compile kernels ahead, while other tasks are traced."""
+"""The renderer's side of the processes that compile kernels, while other tasks are traced.
+
+The renderer only loads kernels from the driver's disk cache. It compiles them itself where there is no such cache, or
+where no process can be started.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,27 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from gpu import cache_folder
+from gpu import CompileError, cache_folder
 from service.ipc import channel
 from service.ipc.messages import driver_of
-from service.system.cpu_time import RunnableTime
+from service.system.memory import machine_memory
+from service.worker.helpers.compile_lane import TRIES, Compiled, Done, Lane, Refused
 from service.worker.helpers.process import HelperProcess
 
 if TYPE_CHECKING:
     from gpu import KernelKey
 
-TRIES = 3  # failures in a row; then everything is compiled in the loop
-LIMIT_S = 60.0  # for one kernel, the helper's start included
-GPU_LIMIT_S = 300.0  # ... on a GPU: NVIDIA's compiler takes 20 s for most kernels, and a minute for some
-SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
+LIMIT_S = 300.0  # for one kernel that somebody waits for: LLVM takes up to a minute, NVIDIA's compiler as well
+SPARE_LIMIT_S = 3600.0  # ... and for one that gets no more of the processor than others leave
+# Bytes that a process may take for kernels, beside its context, by whether the processor is the device: LLVM was seen
+# to take 0.7 GB for one. Never more than half of the machine's memory.
+MEMORY = {True: 2 << 30, False: 8 << 30}
+REFUSED_S = 600.0  # before a kernel that failed is tried again
+ALONE_S = 60.0  # for which kernels are compiled by the renderer where no process could be started
 # What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then, or
 # it was there for one picture alone.
 # A kernel can take a minute, and is compiled from its beginning again where the renderer ends first.
@@ -37,70 +43,7 @@ DISABLED = {"1", "true", "yes", "y", "t"}
 # time that nobody else wants, some time after the start, however long that takes
 Priority = Literal["now", "soon", "spare"]
 
-Done = Callable[[float], None]  # called with the milliseconds that a kernel took
-
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Compiled:
-    """What a helper answers; `cached`: the kernel is in the driver's disk cache."""
-
-    milliseconds: float
-    cached: bool
-    detail: str = ""
-
-
-@dataclass
-class _Lane:
-    """The kernels of one priority, and the process that compiles them one by one."""
-
-    helper: HelperProcess
-    limit_s: float
-    begins: float = 0.0  # by the monotonic clock: nothing is compiled before
-    wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # whom to call, and the client of each
-    key: KernelKey | None = None  # the one under way
-    until: float = 0.0  # by the monotonic clock: when it takes too long
-    runnable: RunnableTime | None = None  # of its process since it began
-    failures: int = 0  # in a row
-    begun: int = 0
-    served: dict[str, int] = field(default_factory=dict)  # by client: the number of its last kernel
-
-    @property
-    def left_s(self) -> float | None:
-        """How many more seconds a wait makes sense for the kernel under way, or for the first one; None: for none."""
-        if self.key is None and not self.wanted:
-            return None
-        return max(0.0, (self.begins if self.key is None else self.until) - time.monotonic())
-
-    @property
-    def is_due(self) -> bool:
-        """Whether the next kernel can be begun."""
-        return self.key is None and bool(self.wanted) and time.monotonic() >= self.begins
-
-    def forget(self, done: Done) -> None:
-        for key, callers in list(self.wanted.items()):
-            callers.pop(done, None)
-            if not callers and key != self.key:
-                del self.wanted[key]
-
-    def choose(self) -> KernelKey:
-        """The next kernel: of the client that was served longest ago, or that came first."""
-        served = {k: min((self.served.get(c, 0) for c in who.values()), default=0) for k, who in self.wanted.items()}
-        self.key = min(self.wanted, key=lambda key: served[key])
-        self.begun += 1
-        if len(self.served) > REMEMBERED:
-            self.served.clear()
-        self.served |= dict.fromkeys(self.wanted[self.key].values(), self.begun)
-        return self.key
-
-    def is_late(self) -> bool:
-        """Whether the kernel takes too long. The time that its process waited for a processor does not count."""
-        if self.key is None or time.monotonic() < self.until:
-            return False
-        left_s = 0.0 if self.runnable is None else self.limit_s - self.runnable.elapsed_s
-        self.until = time.monotonic() + left_s
-        return left_s <= 0
 
 
 class CompileClient:
@@ -115,28 +58,29 @@ class CompileClient:
         self,
         info: dict[str, Any],
         device: int | None,
-        crowded: Callable[[], bool],
         lifeline: int | None = None,
         foresees: bool = True,
     ) -> None:
-        """`info` is the renderer's; `crowded`: compiling in the loop would stall somebody. `lifeline`: the process
-        for "now" ends with the server; where only the renderer is killed it finishes its kernel, for the next one.
-        Without `foresees` only kernels that somebody waits for are compiled."""
+        """`info` is the renderer's. `lifeline`: the process for "now" ends with the server; where only the renderer
+        is killed it finishes its kernel, for the next one. Without `foresees` only kernels that somebody waits for
+        are compiled."""
         self.foresees = foresees
         self._driver = driver_of(info)
-        self._crowded = crowded
         self._keeps = None if info["software"] else info  # where kernels are kept by us, and no record is needed
         self._able = self._keeps is not None or _has_cache()
+        self._alone_until = 0.0  # by the monotonic clock: no process can be started
         self._records = records()
-        self._known: set[KernelKey] = set()  # kernels that are compiled, or that no helper could compile
+        self._known: set[KernelKey] = set()  # kernels that are compiled, or that the driver does not keep
+        self._refused: dict[KernelKey, tuple[str, float]] = {}  # why, and until when it holds
         self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
-        self._lanes = dict[Priority, _Lane]()
+        self._lanes = dict[Priority, Lane]()
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
-        limit_s = LIMIT_S if info["software"] else GPU_LIMIT_S
+        memory = min(MEMORY[info["software"]], machine_memory() // 2)
+        given += ["--memory", str(memory)]
         for each in get_args(Priority):
             line = lifeline if each == "now" else None
             helper = HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line)
-            self._lanes[each] = _Lane(helper, limit_s if each == "now" else SPARE_LIMIT_S)
+            self._lanes[each] = Lane(helper, LIMIT_S if each == "now" else SPARE_LIMIT_S, memory)
         self._lanes["spare"].begins = time.monotonic() + SPARE_AFTER_S
 
     @property
@@ -160,18 +104,23 @@ class CompileClient:
         """Whether the kernel loads at once, from the driver's disk cache."""
         return key in self._met or self._is_recorded(key)
 
-    def queue(self, key: KernelKey, done: Done, alone: bool = False, client: str = "") -> bool:
+    @property
+    def able(self) -> bool:
+        """Whether kernels are compiled by processes: there is a cache to compile into, and they can be started."""
+        return self._able and time.monotonic() >= self._alone_until
+
+    def queue(self, key: KernelKey, done: Done, client: str = "") -> bool:
         """Queue a kernel that a task waits for, in the place of what `done` waited for; whether `hear` will call
         `done`. Turns go round the clients.
 
-        False: use it now. It is compiled already, or compiling it in the loop stalls nobody; `alone`: not even then,
-        as there is something to show meanwhile."""
+        False: use it now. It is compiled already, or no process can compile it. Raises CompileError where it was
+        found that none can be made."""
         lane = self._lanes["now"]
         lane.forget(done)
-        if key in self._known:
+        if self._is_compiled(key):
             return False
-        if key not in lane.wanted and (not (alone or self._crowded()) or self._is_compiled(key)):
-            return False
+        if (detail := self._refusal(key)) is not None:
+            raise CompileError(f"the scene's kernel could not be compiled: {detail}")
         return self._add(lane, key, done, client)
 
     def prepare(self, keys: list[KernelKey], priority: Priority, client: str = "", done: Done | None = None) -> None:
@@ -183,7 +132,7 @@ class CompileClient:
         if done is not None:
             lane.forget(done)
         for key in keys:
-            if not self._is_compiled(key):
+            if not self._is_compiled(key) and self._refusal(key) is None:
                 self._add(lane, key, done or _nobody, client)
 
     def forget(self, done: Done) -> None:
@@ -211,11 +160,11 @@ class CompileClient:
         for lane in self._lanes.values():
             lane.helper.close()
 
-    def _add(self, lane: _Lane, key: KernelKey, done: Done, client: str) -> bool:
+    def _add(self, lane: Lane, key: KernelKey, done: Done, client: str) -> bool:
         """Queue a kernel or join who waits for it. False: no helper can be started."""
         if key in lane.wanted:
             lane.wanted[key][done] = client
-        elif self._able:
+        elif self.able:
             lane.wanted[key] = {done: client}
             if lane.is_due:
                 self._begin(lane)
@@ -231,6 +180,11 @@ class CompileClient:
             return key.is_kept(self._keeps)
         return self._able and os.path.exists(self._records / key.digest(self._driver))
 
+    def _refusal(self, key: KernelKey) -> str | None:
+        """Why the kernel cannot be compiled, as was found lately."""
+        detail, until = self._refused.get(key, ("", 0.0))
+        return detail if time.monotonic() < until else None
+
     def _record(self, key: KernelKey) -> None:
         """Record that a kernel is in the driver's disk cache."""
         if self._able:
@@ -240,58 +194,52 @@ class CompileClient:
             except OSError as error:
                 log.info("could not record a compiled kernel", {"error": error})
 
-    def _begin(self, lane: _Lane) -> None:
-        """Send the next request; where the process cannot be started, all callers compile for themselves."""
+    def _begin(self, lane: Lane) -> None:
+        """Send the next request; where no process can be started, all callers compile for themselves for a while."""
         try:
-            if self._able and lane.failures < TRIES:
-                lane.helper.ask(lane.choose())
-                lane.until = time.monotonic() + lane.limit_s
-                lane.runnable = None if lane.helper.process_id is None else RunnableTime(lane.helper.process_id)
+            if self.able and lane.failures < TRIES:
+                lane.begin()
                 return
-        except (channel.Closed, OSError) as error:  # it can't be started
+        except (channel.Closed, OSError) as error:
             log.info("could not start the compiler", {"error": error or "it had ended"})
             lane.helper.close()
-        self._able = False
-        log.warning("gave up compiling ahead: kernels are compiled in the loop")
-        for key in list(lane.wanted):
-            self._end(lane, key, 0.0)
+        self._alone_until = time.monotonic() + ALONE_S
+        lane.failures, lane.key = TRIES - 1, None
+        log.warning("no process can compile kernels: the renderer does, and others wait", {"s": round(ALONE_S)})
+        for callers in [lane.wanted.pop(key) for key in list(lane.wanted)]:
+            for done in callers:
+                done(0.0)
 
-    def _hear(self, lane: _Lane) -> None:
-        try:
-            answer: Compiled = lane.helper.hear()
-        except BlockingIOError:
-            if lane.is_late():
-                self._give_up(lane, f"it took more than {lane.limit_s:.0f} s")
-        except channel.Closed:
-            self._give_up(lane, "the compiler's process ended unexpectedly")
-        else:
-            assert lane.key is not None
-            lane.failures = 0 if answer.cached else lane.failures + 1
-            if not answer.cached:
-                log.warning("compiled ahead in vain: the driver has no disk cache to write to")
-            if answer.detail:
-                log.debug("could not compile ahead", {"error": answer.detail, "ms": round(answer.milliseconds)})
+    def _hear(self, lane: Lane) -> None:
+        key, ended = lane.key, lane.hear()
+        if ended is not None:
+            assert key is not None
+            callers, milliseconds = lane.end(), 0.0
+            if isinstance(ended, Refused) or ended.detail:
+                self._refuse(key, ended.detail)
             else:
-                log.debug("compiled ahead", {"ms": round(answer.milliseconds)})
-            if answer.cached and not answer.detail:
-                self._record(lane.key)
-            self._end(lane, lane.key, answer.milliseconds)
+                milliseconds = ended.milliseconds
+                self._note(key, ended)
+            for done in callers:
+                done(milliseconds)
         if lane.is_due:
             self._begin(lane)
 
-    def _give_up(self, lane: _Lane, detail: str) -> None:
-        """End the process, and have the kernel under way compiled in the loop."""
-        lane.helper.close()
-        if lane.key is not None:
-            lane.failures += 1
-            log.warning("left a kernel to be compiled in the loop", {"reason": detail})
-            self._end(lane, lane.key, 0.0)
-
-    def _end(self, lane: _Lane, key: KernelKey, milliseconds: float) -> None:
-        lane.key = None
+    def _note(self, key: KernelKey, compiled: Compiled) -> None:
+        """A process has compiled the kernel: the renderer loads it now, unless the driver keeps none."""
+        log.debug("compiled ahead", {"ms": round(compiled.milliseconds)})
         self._known.add(key)
-        for done in lane.wanted.pop(key):
-            done(milliseconds)
+        if compiled.cached:
+            self._record(key)
+        else:
+            log.warning("compiled ahead in vain: the driver has no disk cache to write to")
+
+    def _refuse(self, key: KernelKey, detail: str) -> None:
+        """Nobody compiles the kernel, nor the renderer: whoever needs it is told why."""
+        log.warning("a kernel could not be compiled", {"entry": key.entry, "error": detail})
+        if len(self._refused) >= REMEMBERED:
+            self._refused.clear()
+        self._refused[key] = detail, time.monotonic() + REFUSED_S
 
 
 def _nobody(milliseconds: float) -> None:

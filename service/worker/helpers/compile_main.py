@@ -10,12 +10,14 @@ from __future__ import annotations
 import argparse
 import fcntl
 import os
+import resource
 import select
 import signal
 import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -23,9 +25,11 @@ from service.ipc import channel
 from service.system.confined import hide
 from service.system.lifeline import end_with, end_with_pipe, hung_up
 from service.system.priority import HIGHEST, raise_thread_niceness
-from service.worker.helpers.compile_client import Compiled, Priority, records
+from service.system.shared_memory import trim
+from service.worker.helpers.compile_client import Priority, records
+from service.worker.helpers.compile_lane import Compiled, Started
 
-IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
+IDLE_S = 60.0  # then it ends, and gives back what the driver and its compiler hold (some 250 MB)
 LOCKS: dict[Priority, str] = {"now": ".lock", "soon": ".soon", "spare": ".spare"}  # endings of the files
 LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
 SPARE_IDLE_S = 5.0  # ... where kernels come seldom
@@ -38,6 +42,7 @@ def main() -> int:
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--driver", required=True, help="its name and version, which records go by")
     parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
+    parser.add_argument("--memory", type=int, required=True, help="bytes that it may take for kernels")
     parser.add_argument("--device", type=int)
     parser.add_argument("--priority", choices=get_args(Priority), default="now")
     arguments = parser.parse_args()
@@ -59,6 +64,8 @@ def main() -> int:
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             ahead = Precompiler(arguments.device)
+            _bound(arguments.memory)
+            channel.send(end, Started())
             while select.select([end], [], [], IDLE_S if priority == "now" else SPARE_IDLE_S)[0]:
                 key = channel.receive(end, wait=True)
                 record = records() / key.digest(arguments.driver)
@@ -69,12 +76,28 @@ def main() -> int:
                         compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(key))
                         if compiled.cached:
                             _record(record)
-                except GpuError as error:  # the renderer meets it too, and says it to whom it concerns
+                except GpuError as error:
                     compiled = Compiled(0.0, True, str(error))
-                channel.send(end, compiled)
+                trim()
+                channel.send(end, replace(compiled, resident=_status("VmRSS")))
         except (channel.Closed, GpuError):
             pass
     return 0
+
+
+def _bound(memory: int) -> None:
+    """Let this process take so many more bytes of memory of its own. Address space is another thing: drivers of GPUs
+    reserve more of it than any machine has memory. LLVM ends its process where it gets no more."""
+    most = _status("VmData") + memory
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    within = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (within, hard))
+
+
+def _status(name: str) -> int:
+    """A figure of this process [proc_pid_status(5)], in bytes."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) << 10 for line in lines if line.startswith(f"{name}:"))
 
 
 @contextmanager

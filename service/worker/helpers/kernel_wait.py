@@ -20,9 +20,10 @@ class KernelWait:
         self._client = client
         self._compiled_ms = 0.0
 
-    def begin(self, key: KernelKey, shown: bool = False) -> bool:
-        """Whether that kernel is now being compiled; `shown`: with something to look at meanwhile."""
-        self.compiling = self.compiler is not None and self.compiler.queue(key, self._hear, shown, self._client)
+    def begin(self, key: KernelKey) -> bool:
+        """Whether that kernel is now being compiled. Raises CompileError where that has failed."""
+        self.compiling = False
+        self.compiling = self.compiler is not None and self.compiler.queue(key, self._hear, self._client)
         return self.compiling
 
     def stop(self) -> None:

@@ -51,13 +51,16 @@ class HelperProcess:
             raise BlockingIOError
         return channel.receive(self._end)
 
-    def close(self) -> None:
+    def close(self) -> int:
+        """End the process, if there is one; its exit code, which is its own where it had ended before."""
+        code = 0
         if self._end is not None:
             self._end.close()
         if self._process is not None:
             self._process.kill()
-            self._process.wait()
+            code = self._process.wait()
         self._end = self._process = None
+        return code
 
     def _begin(self) -> socket.socket:
         if self._end is not None:

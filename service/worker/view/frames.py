@@ -211,7 +211,7 @@ class FrameSource:
         self._denoiser_answered = True
 
     def _waits(self, picture: Picture, coverage: bool = False) -> bool:
-        """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
+        """Whether the kernel for the AOVs of the first hit is being compiled. Raises CompileError."""
         if self._wait.compiler is None or picture.guided_yet(coverage):
             return False
         scene, entry = picture.scene, kernel_keys.COVER if coverage else kernel_keys.GUIDES

@@ -65,7 +65,7 @@ def test_only_what_somebody_waits_for_is_compiled_without_it(
     gpu: Renderer, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
-    compiler, helper = CompileClient(gpu.info, None, lambda: True, foresees=False), Helper()
+    compiler, helper = CompileClient(gpu.info, None, foresees=False), Helper()
     for lane in compiler._lanes.values():
         lane.helper = helper  # type: ignore[assignment]
         lane.begins = 0.0

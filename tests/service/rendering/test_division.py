@@ -313,7 +313,7 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
     picture = sent_picture(Steps(full.save()).finish(), driver_of(gpu.info))
     idle, back = resting(), Task(context, 2)
     back.update(begun(2))
-    back.picture.settle()
+    back.turn()
     back.picture.restore(Restore(2, 1, picture, None, Progress(16, None, 0.0, None)))
     assert back.picture.residency.full.samples == 16 and not idle.bytes
     assert not any(isinstance(message, Failed) for message in sent)
