@@ -4,6 +4,7 @@ app        what is served: the routes and the editor's files
 cli        the command line; `commands` has a module for each command
 config     every limit, and the SUNBOX_* variables that set it
 callback_hosts  where callbacks may be sent
+containers  whether this process is in one
 problems   the errors that callers see, with their HTTP statuses
 colorimetry  sRGB and linear Rec.709
 views      the names of AOVs and tone maps

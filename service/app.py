@@ -65,6 +65,7 @@ from service.storage.stores import storage
 from service.system.background import Background, report_callbacks, reported
 from service.system.confined import hide
 from service.system.memory import MemoryBudget
+from service.system.priority import set_steps
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # seconds between pings: proxies cut connections that are idle for a minute
@@ -146,6 +147,7 @@ def run(config: Config) -> int:
     _give_memory_back()
     hide()
     sys.setswitchinterval(SWITCH_S)
+    set_steps(config.nice)
     if unknown := unknown_variables():
         log.warning("these variables are no settings and change nothing", {"names": ",".join(unknown)})
     if (reason := missing_device(config)) is not None:

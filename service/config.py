@@ -22,6 +22,7 @@ from pydantic import (
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from service.callback_hosts import checked_hosts, checked_secrets
+from service.containers import in_container
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 2 GiB
 MIB, GIB = 2**20, 2**30
@@ -36,6 +37,7 @@ NUMBER = re.compile(r"[0-9]{1,6}")
 
 ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
 
+NICENESS = 5  # steps, where the machine may be somebody's desktop: a quarter of a processor beside a busy program
 Ahead = Literal["off", "some", "all"]  # kernels that are compiled before anybody waits for them
 Words = Annotated[list[str], NoDecode]
 # Fields whose variables are lists, separated by commas.
@@ -186,6 +188,13 @@ class Config(BaseSettings):
         "some",
         description="Which kernels are compiled before anybody waits for them: `off`, none; `some`, those of the "
         "built-in scenes and those that the next edit may need; `all` is `some` for now.",
+    )
+    nice: int = Field(
+        default_factory=lambda: 0 if in_container() else NICENESS,
+        ge=0,
+        le=19,
+        description="Steps of [niceness](#processor-time) by which renderers, and all else that works for requests, "
+        "give way to other programs and to the server's answers (default: 5, and 0 in a container).",
     )
     hang_s: Seconds = Field(
         10.0,
@@ -378,23 +387,3 @@ def _said(message: str) -> str:
     """pydantic's message as the second half of a sentence."""
     plain = message.removeprefix("Value error, ")
     return plain[:1].lower() + plain[1:]
-
-
-def table() -> str:
-    """The table of variables in docs/operation.md, in Markdown."""
-    lines = ["| variable | default | |", "|---|---|---|"]
-    for name, field in Config.model_fields.items():
-        lines.append(f"| `SUNBOX_{name.upper()}` | {_told(field.get_default())} | {field.description} |")
-    return "\n".join(lines) + "\n"
-
-
-def _told(default: Any) -> str:
-    if default is None or not isinstance(default, int | float | str):
-        return ""
-    if isinstance(default, bool):
-        return str(default).lower()
-    if isinstance(default, int):
-        for unit, size in (("GiB", GIB), ("MiB", MIB)):
-            if default >= size and default % size == 0 and default != MAX_PIXELS and default != 2**26:
-                return f"{default // size} {unit}"
-    return f"{default:g}" if isinstance(default, float) else str(default)

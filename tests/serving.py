@@ -20,6 +20,7 @@ import numpy as np
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
+from service.config import NICENESS
 from tests import kernel_count
 
 COLD_S = 150.0  # caches are empty: every kernel is compiled
@@ -59,16 +60,16 @@ def wait_until(reached: Callable[[], object], pause_s: float = 0.02) -> None:
 
 class Server:
     """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one. What is
-    compiled ahead is the session's (`AHEAD`), and all other settings are its own. Where it has one key, `http` and
-    `client` show that."""
+    compiled ahead is the session's (`AHEAD`), its processes are as nice as on a desktop, and all other settings are
+    its own. Where it has one key, `http` and `client` show that."""
 
     def __init__(self, folder: Path, *, python: Sequence[str] = (), **variables: str) -> None:
         self.folder, self.log = folder, folder / "server.log"
         keys = variables.get("SUNBOX_API_KEY", "")
         self.key = None if keys == "" or "," in keys else keys
-        own = {AHEAD: os.environ[AHEAD], "SUNBOX_DATA_DIR": str(folder / "data"), **variables}
+        own = {AHEAD: os.environ[AHEAD], "SUNBOX_NICE": str(NICENESS), "SUNBOX_DATA_DIR": str(folder / "data")}
         others = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
-        self._environment = others | own
+        self._environment = others | own | variables
         self._command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
         self.start()
 

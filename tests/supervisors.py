@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gpu import RenderSettings
+from service.config import NICENESS
 from service.ipc.messages import FromRenderer, StopRule, View
 from service.pack import pack
 from service.renderers.local.process import Options
@@ -73,8 +74,9 @@ class Rendering(Protocol):
 
 
 def renderer_options(**given: Any) -> Options:
-    """Options of a renderer's process, which compiles ahead what the session's servers do unless `ahead` is given."""
-    return Options(**{"ahead": os.environ[AHEAD], **given})
+    """Options of a renderer's process, which compiles ahead what the session's servers do unless `ahead` is given,
+    and is as nice as theirs."""
+    return Options(**{"ahead": os.environ[AHEAD], "nice": NICENESS, **given})
 
 
 def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], checkpoint_s: float = 2.0, **options: Any) -> None:

@@ -1,4 +1,4 @@
-"""The process that parses large JSON bodies: `python -m service.requests.parser_child FD LIFELINE`, FD being a link.
+"""The process that parses large JSON bodies: `python -m service.requests.parser_child FD ...`, FD being a link.
 
 The C scanner and pydantic keep all other threads of their process waiting, seconds for some bodies. Here nobody
 waits, and what takes too much memory or time is ended. It ends with its parent, and when nothing came for a while.
@@ -17,7 +17,6 @@ from service.requests.parsers import PARSERS, Kind
 from service.system.confined import begin, bounded
 from service.system.shared_memory import trim
 
-NICENESS = 10  # as the renderer has, whose share of the processors large bodies would take otherwise
 IDLE_S = 300.0
 BASE_BYTES, TIMES = 256 << 20, 3  # of address space: for what comes beside the values; models and arrays made of them
 
@@ -39,7 +38,7 @@ class Failed:
 
 
 def main() -> None:
-    end = begin(NICENESS)
+    end = begin()
     gc.disable()  # it would go through all values again and again, and find nothing to free
     gc.freeze()
     end.settimeout(IDLE_S)

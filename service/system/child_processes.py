@@ -19,6 +19,7 @@ from pathlib import Path
 
 from service.system.confined import Rights
 from service.system.cpu_time import answers
+from service.system.priority import working_niceness
 
 ROOT = Path(__file__).parents[2]
 START_SECONDS = 30.0  # libraries read from a cold disk
@@ -49,8 +50,8 @@ class Closed(Exception):
 
 
 class Child:
-    """`python -m MODULE DESCRIPTOR LIFELINE`, the descriptor being its end of a socket of whole messages, `link`
-    ours, and the lifeline the end of a pipe that nobody writes to: it ends with the other end, which is ours.
+    """`python -m MODULE DESCRIPTOR LIFELINE NICENESS`, the descriptor being its end of a socket of whole messages,
+    `link` ours, and the lifeline the end of a pipe that nobody writes to: it ends with the other end, which is ours.
 
     Its first message says which rights it has given up. `is_spent` is set where it should get no more work.
     """
@@ -60,7 +61,7 @@ class Child:
         line, self._lifeline = os.pipe()
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", module, str(theirs.fileno()), str(line)],
+                [sys.executable, "-m", module, str(theirs.fileno()), str(line), str(working_niceness())],
                 cwd=ROOT,
                 env=inherited_environment() | THREADS | environment,
                 pass_fds=[theirs.fileno(), line],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 from collections import Counter, deque
 from collections.abc import Callable
@@ -13,10 +12,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from service.system.priority import raise_thread_niceness
+from service.system.priority import raise_thread_niceness, working_niceness
 from service.system.turns import CALLER
 
-# Steps of niceness above the event loop and the encoders; the renderer is 10 above.
+# Steps of niceness above the event loop and the encoders, as far as SUNBOX_NICE goes.
 NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
 WRITING_NICENESS = 12  # of threads that write large pictures to files while every stream goes on
 
@@ -24,7 +23,7 @@ T = TypeVar("T")
 
 
 def _yield_to_others(niceness: int = NICENESS) -> None:
-    raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, os.getpid()) + niceness)
+    raise_thread_niceness(working_niceness(niceness))
 
 
 @dataclass(frozen=True)

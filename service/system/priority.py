@@ -1,4 +1,5 @@
-"""How processor time is shared: work that nobody waits for takes a higher niceness than work that somebody does."""
+"""How processor time is shared: what works for requests gives way to the event loop and to other programs by as many
+steps of niceness as SUNBOX_NICE says; what is done ahead, and for nobody yet, gives way further."""
 
 from __future__ import annotations
 
@@ -10,6 +11,20 @@ from pathlib import Path
 HIGHEST = 19  # the kernel's last step; it takes a larger one for this
 
 log = logging.getLogger(__name__)
+
+_steps = 0
+
+
+def set_steps(steps: int) -> None:
+    """Have threads and processes that begin from now on give way by so many steps; once, at the server's start."""
+    global _steps
+    _steps = steps
+
+
+def working_niceness(most: int = HIGHEST) -> int:
+    """The niceness of what works for requests, of threads of this process and of its children: at most `most` steps
+    above this process's own."""
+    return min(os.getpriority(os.PRIO_PROCESS, os.getpid()) + min(_steps, most), HIGHEST)
 
 
 def raise_thread_niceness(niceness: int, thread: int = 0) -> None:

@@ -19,7 +19,6 @@ from service.system.lifeline import end_with
 from service.system.priority import raise_process_niceness
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
-NICENESS = 10  # steps above the server's: its event loop and encoders come first, before llvmpipe's threads too
 DEVICES = Path("/dev/dri")
 
 log = logging.getLogger("service.worker")  # __name__ is __main__ here
@@ -33,6 +32,7 @@ def main() -> int:
     parser.add_argument("--host-memory", type=int, help="the same where the device's memory is the machine's")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--ahead", required=True, help="which kernels nobody has to wait for: off, some or all")
+    parser.add_argument("--nice", type=int, required=True, help="steps of niceness above the server's")
     parser.add_argument("--device", type=int)
     parser.add_argument("--software", action="store_true", help="on the processor, whatever its device's number is")
     parser.add_argument("--name", default="0", help="the renderer's id, for the log")
@@ -77,7 +77,7 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
         channel.send(end, Unable(str(error)))
         return 1
     # Not earlier: beside a dozen busy programs, starting at this priority took 30 s instead of 3 s.
-    raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
+    raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + arguments.nice)
     limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
     told = {"denoiser": denoise.version(), "memory_limit": None if limit == UNLIMITED else limit}
     channel.send(end, Ready({**renderer.info, **told}))

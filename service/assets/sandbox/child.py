@@ -1,4 +1,4 @@
-"""The process that parses uploaded files: `python -m service.assets.sandbox.child FD`, with a socket to the parent.
+"""The process that parses uploaded files: `python -m service.assets.sandbox.child FD ...`, a socket to the parent.
 
 It answers requests one by one: a format and a file come in, arrays in sealed memory go out. It ends when the parent
 does; it is killed when a file takes too much time, and its allocations fail when a file takes too much memory. Before
@@ -30,13 +30,12 @@ from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
 
-NICENESS = 5
 LARGE = 1 << 20  # bytes of a file after which freed memory is returned to the system
 EARLY = ("PIL.Image", "PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.WebPImagePlugin", "OpenImageIO", "DracoPy")
 
 
 def main() -> None:
-    link = begin(NICENESS, EARLY)
+    link = begin(EARLY)
     is_capped = False
     while True:
         try:

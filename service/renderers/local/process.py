@@ -97,6 +97,7 @@ class Options:
     host_memory: int | None = None  # the same where that is the machine's memory
     checkpoint_s: float = inf  # between two of a render; inf: none before its end
     ahead: Ahead = "some"
+    nice: int = 0  # steps of niceness above the server's
 
 
 class Process:
@@ -194,7 +195,7 @@ def _spawn(
 ) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.worker", str(end.fileno()), str(heartbeat_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(setup.level())]
-    command += ["--checkpoint", str(options.checkpoint_s), "--ahead", options.ahead]
+    command += ["--checkpoint", str(options.checkpoint_s), "--ahead", options.ahead, "--nice", str(options.nice)]
     command += ["--name", options.name, *(["--software"] if options.software else [])]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]

@@ -28,6 +28,7 @@ def seats(config: Config, host_memory: int) -> list[Seat]:
         host_memory=host_memory // max(1, config.software_renderers, len(config.devices)),
         checkpoint_s=config.checkpoint_s,
         ahead=config.ahead,
+        nice=config.nice,
     )
     if (count := config.software_renderers) > 0:
         memory = None if config.gpu_memory is None else config.gpu_memory // count

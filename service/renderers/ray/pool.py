@@ -84,5 +84,6 @@ def cluster_pool(config: Config) -> ClusterPool:
         "memory": config.gpu_memory,
         "checkpoint_s": config.checkpoint_s,
         "ahead": config.ahead,
+        "nice": config.nice,
     }
     return ClusterPool(Cluster(config.ray, config.ray_renderers, config.require_gpu, options))

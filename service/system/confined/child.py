@@ -15,10 +15,12 @@ from service.system.confined.rights import renounce
 from service.system.lifeline import end_with_pipe
 
 
-def begin(niceness: int, modules: Iterable[str] = ()) -> socket.socket:
+def begin(modules: Iterable[str] = ()) -> socket.socket:
     """The socket to the parent, whose descriptor is the child's first argument. The second is a pipe's, whose other
-    end the parent holds: the child ends with it, even inside a library's loop. The child has given up all rights that
-    it does not need, and has sent the parent their list. Before, while it could open files, it imported `modules`.
+    end the parent holds: the child ends with it, even inside a library's loop. The third is its niceness.
+
+    The child has given up all rights that it does not need, and has sent the parent their list. Before, while it
+    could open files, it imported `modules`.
     """
     link = socket.socket(fileno=int(sys.argv[1]))
     # Not by a signal from `link`: the one that a message sends may come when the message has been read, and work on
@@ -27,7 +29,7 @@ def begin(niceness: int, modules: Iterable[str] = ()) -> socket.socket:
         sys.exit()
     for name in modules:
         importlib.import_module(name)
-    link.sendmsg([json.dumps(asdict(renounce(confine(niceness)))).encode()])
+    link.sendmsg([json.dumps(asdict(renounce(confine(int(sys.argv[3]))))).encode()])
     return link
 
 

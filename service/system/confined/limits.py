@@ -10,12 +10,15 @@ import resource
 import signal
 from functools import cache
 
+from service.system.priority import raise_thread_niceness
+
 CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
 DESCRIPTORS = 64  # a file, a few for its libraries, and those of the answer
 
 
 def confine(niceness: int) -> bool:
-    """Write no core file, drop the network where the kernel allows it, be the first to go when memory runs out.
+    """Have at least this niceness, write no core file, drop the network where the kernel allows it, be the first to
+    go when memory runs out.
 
     Whether the network was dropped.
     """
@@ -24,7 +27,7 @@ def confine(niceness: int) -> bool:
     libc = ctypes.CDLL(None, use_errno=True)
     dropped = any(libc.unshare(flags) == 0 for flags in (CLONE_NEWNET, CLONE_NEWUSER | CLONE_NEWNET))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle; it closes the socket
-    os.nice(niceness)
+    raise_thread_niceness(niceness)
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
         score.write("1000")
     return dropped

@@ -1,7 +1,7 @@
 """Denoises pictures: `python -m service.worker.helpers.denoise_main DESCRIPTOR --parent PID`.
 
-A process of its own, so that neither the denoiser's seconds nor its misfortunes are the render loop's, and at the
-lowest priority, so that nobody's first frame waits for it.
+A process of its own, so that neither the denoiser's seconds nor its misfortunes are the render loop's, and nicer than
+that, so that nobody's first frame waits for it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from service.system.confined import hide
 from service.system.lifeline import end_with
 from service.worker.helpers.denoise_client import DenoiseRequest, DenoiseResult
 
-NICENESS = 19  # the renderer is at 10: where both want the processor, this one gets an eighth of it
+NICENESS = 5  # steps above the renderer's: where both want the processor, this one gets a quarter of it
 IDLE_S = 60.0  # then it ends, and gives back what the library holds (some 200 MB)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gpu import SceneEdit
+from service.config import NICENESS
 from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.problems import Unavailable
 from service.renderers.local import restarts
@@ -126,7 +127,7 @@ def test_killed_between_a_frame_and_the_next_want(rendering: Rendering) -> None:
         assert niceness(supervisor.process_id) == {own}
         supervisor.send(Want(task, 2, View()))
         assert (await ears.next(Frame)).serial == 2
-        assert min(niceness(supervisor.process_id)) >= min(own + 10, 19)
+        assert min(niceness(supervisor.process_id)) >= min(own + NICENESS, 19)
 
     rendering(test)
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
+from service import containers
+from service.config import NICENESS, load_config
+from service.renderers.pool.devices import seats
 from service.system import priority
 from service.system.priority import raise_thread_niceness
+from tests.serving import SCENE, SMALL, Server, families
 
 GIVES_WAY = """
 import os, threading
@@ -32,17 +38,21 @@ done.set()
 thread.join()
 print(*found, os.getpriority(os.PRIO_PROCESS, 0))
 """
+# In the commands of processes; the last one is there where a kernel was new.
+WORKERS = ("service.worker\0", "service.requests.parser_child", "service.assets.sandbox.child", "--priority\0now")
 PACKS = """
-import asyncio, os
+import asyncio, os, sys
 from service.system.executors import packing
+from service.system.priority import set_steps
 
 os.nice(10)
+set_steps(int(sys.argv[1]))
 print(asyncio.run(packing(lambda: os.getpriority(os.PRIO_PROCESS, 0))))
 """
 
 
-def printed(program: str) -> list[int]:
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30)
+def printed(program: str, *arguments: str) -> list[int]:
+    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=30)
     assert done.returncode == 0, done.stderr
     return [int(word) for word in done.stdout.split()]
 
@@ -52,8 +62,38 @@ def test_a_thread_that_gives_way_more_than_asked_stays_so() -> None:
     assert printed(GIVES_WAY) == [19, min(os.getpriority(os.PRIO_PROCESS, 0) + 3, 19)]
 
 
-def test_who_starts_the_server_with_nice_can_pack() -> None:
-    assert printed(PACKS) == [min(os.getpriority(os.PRIO_PROCESS, 0) + 15, 19)]
+@pytest.mark.parametrize("steps", [0, 2])
+def test_who_starts_the_server_with_nice_can_pack(steps: int) -> None:
+    assert printed(PACKS, str(steps)) == [min(os.getpriority(os.PRIO_PROCESS, 0) + 10 + steps, 19)]
+
+
+def niceness(pid: int) -> int:
+    """The least of a process's threads: drivers have some that give way further."""
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return min(os.getpriority(os.PRIO_PROCESS, int(thread.name)) for thread in threads)
+
+
+def test_what_works_for_somebody_gives_way_by_the_steps_that_are_set(server: Server) -> None:
+    """Parsers, of files and of large bodies, the renderer, and what compiles for it."""
+    body = json.dumps({"scene": SCENE, "settings": SMALL}) + " " * (1 << 17)
+    server.http.post("/v1/render", content=body, headers={"content-type": "application/json"}).raise_for_status()
+    found: dict[str, int] = {}
+    for pid in families(server.process.pid):
+        command = Path(f"/proc/{pid}/cmdline").read_bytes()
+        found |= {name: niceness(pid) for name in WORKERS if name.encode() in command}
+    expected = min(os.getpriority(os.PRIO_PROCESS, server.process.pid) + NICENESS, 19)
+    assert len(found) >= len(WORKERS) - 1 and set(found.values()) == {expected}, found
+
+
+@pytest.mark.parametrize(("marks", "steps"), [((), NICENESS), ((__file__,), 0)])
+def test_a_container_s_processes_give_way_to_nobody(
+    marks: tuple[str, ...], steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(containers, "MARKS", marks)
+    for name in containers.VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    assert load_config().nice == steps
+    assert [seat.options.nice for seat in seats(load_config(nice=7), 1000)] == [7]
 
 
 def test_a_thread_that_has_ended_is_skipped(caplog: pytest.LogCaptureFixture) -> None:
