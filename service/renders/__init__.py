@@ -4,6 +4,7 @@ job         one render, as the queue and its callers see it
 queue       all renders, with bounds on how many wait, run and are kept
 slots       which renders run, which wait, and which give way to others
 turns       whose render starts next
+recent      what each client had of the slots within the last minute
 preemption  which renders give way to one that waits
 ordered     what was asked for, where it stands, its scene, and where it is stored
 life        the states of a render, and the places where its picture may be

@@ -10,6 +10,10 @@ from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
 WAIT_S = 10.0  # that a render waits before others give way to it
+SOON_S = 1.0  # instead, where its client has nothing and had less than LITTLE_S within the last minute
+# A client that comes again and again with a little interrupts others for that part of the time at most: each
+# interruption costs them a checkpoint and a scene to load.
+LITTLE_S = 1.0
 TIMES = 2  # what a render must have had already of what the waiting one had, to give way to it
 
 

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from itertools import chain, islice
 
 from service.renders.job import Job
-from service.renders.preemption import WAIT_S, giving_way
+from service.renders.preemption import LITTLE_S, SOON_S, WAIT_S, giving_way
+from service.renders.recent import Recent
 from service.renders.turns import Turns
 from service.system.background import Background, reported
 
@@ -35,6 +36,7 @@ class Slots:
         self._ended = ended
         self._clock = clock
         self._running: dict[asyncio.Task[None], Job] = {}
+        self._recent = Recent(clock)
         self._since: dict[Job, float] = {}  # when each that waits came into line
         self._lacking: dict[Job, float] = {}  # those that something is missing for, since when, the longest first
         self._tried: dict[Job, None] = {}  # of these, those that are not to be tried just now, the next ones first
@@ -70,7 +72,8 @@ class Slots:
     def dispatch(self) -> None:
         """Start what may run."""
         while not self.closing and self._free > 0:
-            job = self.waiting.next(Counter(job.owner for job in self._running.values()), self._fits)
+            running = Counter(job.owner for job in self._running.values())
+            job = self.waiting.next(running, self._fits, self._may_have_one)
             if job is None:
                 break
             self._start(job)
@@ -78,7 +81,17 @@ class Slots:
 
     @property
     def _free(self) -> int:
-        return self._most - len(self._running) - (self._claim is not None)
+        """Slots that nobody has, without the one that others give way for."""
+        stay = sum(job not in self._leaving for job in self._running.values())
+        return self._most - max(len(self._running), stay + (self._claim is not None))
+
+    def _may_have_one(self, owner: str) -> bool:
+        """Whether an owner may have a slot that is free. While several owners have renders here, or had within the
+        last minute, the last one is for owners who have none: they would wait until somebody has given way."""
+        running = {job.owner for job in self._running.values()}
+        if self._free > 1 or not owner or owner not in running:
+            return True
+        return len({*running, *self.waiting.owners, *self._recent.owners}) == 1
 
     def _look(self) -> None:
         self._timer = None
@@ -101,12 +114,14 @@ class Slots:
     def _start(self, job: Job) -> None:
         self._lacking.pop(job, None)
         self._since.pop(job, None)
+        self._recent.begins(job)
         task = self._tasks.start("render", job.run(), job.rendering.died)
         self._running[task] = job
         task.add_done_callback(self._ran)
 
     def _ran(self, task: asyncio.Task[None]) -> None:
         job = self._running.pop(task)
+        self._recent.ends(job)
         if job in self._leaving and not job.finished.is_set():
             return
         if job.finished.is_set() or self.closing:
@@ -152,13 +167,25 @@ class Slots:
         counts = Counter(job.owner for job in running)
         owners = sorted(self.waiting.owners, key=lambda owner: counts[owner])
         for waiting in islice(chain.from_iterable(map(self._firsts, owners)), AT_ONCE):
-            if now - self._since[waiting] < WAIT_S or not self._in_share(waiting):
+            if not (self._waited_enough(waiting, now - self._since[waiting]) and self._in_share(waiting)):
                 continue
-            chosen = giving_way(waiting, running, self._free, waiting.lacks)
+            free = self._free if self._may_have_one(waiting.owner) else 0
+            chosen = giving_way(waiting, running, free, waiting.lacks)
             if chosen:
                 self._claim, self._leaving = waiting, set(chosen)
                 self._tasks.start("hand-over of slots", self._give_way(waiting, chosen), self._gave_up)
                 return
+
+    def _waited_enough(self, waiting: Job, waited_s: float) -> bool:
+        """Whether others may give way to it. They do so soon where its client has nothing, and has had little lately
+        or lacks a slot alone, of which another client has several."""
+        if not SOON_S <= waited_s < WAIT_S:
+            return waited_s >= WAIT_S
+        counts = Counter(job.client for job in self._running.values())
+        if counts[waiting.client]:
+            return False
+        has_several = max(counts.values(), default=0) > 1
+        return self._recent.seconds(waiting.client) < LITTLE_S or (has_several and not waiting.lacks)
 
     def _firsts(self, owner: str) -> list[Job]:
         """Those of an owner for which others may give way: the first that gave way itself, and some that begin."""

@@ -77,9 +77,15 @@ class Turns(Generic[T]):
         index = bisect_left(queue, _key(render), key=_key)
         return index if index < len(queue) and queue[index] is render else None
 
-    def next(self, running: Counter[str], fits: Callable[[T], bool] = lambda render: True) -> T | None:
-        """Take the next one that `fits`; `running` counts the owners' renders that run."""
-        for owner in sorted(self._queues, key=lambda owner: self._turn(owner, running)):
+    def next(
+        self,
+        running: Counter[str],
+        fits: Callable[[T], bool] = lambda render: True,
+        may: Callable[[str], bool] = lambda owner: True,
+    ) -> T | None:
+        """Take the next one that `fits`, of owners that `may` have another; `running` counts the owners' renders that
+        run."""
+        for owner in sorted(filter(may, self._queues), key=lambda owner: self._turn(owner, running)):
             for render in self._queues[owner]:
                 if fits(render):
                     self.take(render)

@@ -29,7 +29,7 @@ class Job:
         self.client = owner or id
         self.priority, self.began, self.number, self.resident_bytes = priority, False, 0, 0
         self.state, self.recorder, self.lasting, self.shown = "queued", None, True, False
-        self.place, self.memory_share, self.lacks, self.can_give_way = 0, 0.0, 0, False
+        self.place, self.memory_share, self.lacks, self.elapsed_s, self.can_give_way = 0, 0.0, 0, 0.0, False
         self.finished, self.released, self.packed = asyncio.Event(), False, True
         self.changes, self.rendering = Changes[Any](), SimpleNamespace(died=None)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ from service.renders import preemption, slots
 from service.renders.job import Job
 from service.renders.preemption import giving_way
 from service.renders.queue import RenderQueue
-from service.renders.slots import Slots
+from service.renders.recent import RECENT_S
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import weight
@@ -29,6 +29,7 @@ from service.storage.asset_access import NO_USES
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, Renderers, until
+from tests.service.rendering.in_line import Clock, Fake, add, later, scenario, settled
 from tests.supervisors import renderer_options
 
 
@@ -92,76 +93,6 @@ def test_what_waits_for_memory_has_neither_memory_nor_a_slot(tmp_path: Path) -> 
     asyncio.run(scenario())
 
 
-class Fake:
-    """A render that runs until it is told to end or gives way."""
-
-    def __init__(self, id: str, owner: str = "", **more: Any) -> None:
-        self.id, self.owner, self.client = id, owner, owner or id
-        self.place = self.priority = self.lacks = self.resident_bytes = 0
-        self.elapsed_s, self.memory_share, self.began, self.fits = 0.0, 0.0, False, True
-        self.lasting = self.can_give_way = True
-        self.finished, self.leaves = asyncio.Event(), asyncio.Event()
-        self.rendering = self
-        vars(self).update(more)
-
-    def reserve(self) -> bool:
-        return self.fits
-
-    async def run(self) -> None:
-        self.leaves.clear()
-        waits = [asyncio.ensure_future(event.wait()) for event in (self.finished, self.leaves)]
-        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-        for wait in waits:
-            wait.cancel()
-
-    def died(self, error: Exception) -> None:
-        self.finished.set()
-
-    async def give_way(self) -> bool:
-        self.began = True
-        self.leaves.set()
-        return True
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-async def settled() -> None:
-    for _ in range(20):
-        await asyncio.sleep(0)
-
-
-def scenario(most: int, test: Callable[[Any, Clock, Callable[[], list[str]]], Awaitable[None]]) -> None:
-    async def run() -> None:
-        clock = Clock()
-        owned: Any = Slots(most, lambda job: None, clock)
-        await test(owned, clock, lambda: sorted(job.id for job in owned.running))
-        owned.close()
-        for job in owned.running:
-            job.finished.set()
-        await settled()
-
-    asyncio.run(run())
-
-
-async def later(owned: Any, clock: Clock, seconds: float) -> None:
-    """What happens within that time, looked at every second."""
-    for _ in range(int(seconds)):
-        clock.now += 1.0
-        owned._look()
-        await settled()
-
-
-def add(owned: Any, *jobs: Fake) -> None:
-    for job in jobs:
-        owned.add(job)
-        owned.dispatch()
-
-
 def test_an_owner_with_all_slots_gives_back_its_newest_ones() -> None:
     async def test(owned: Any, clock: Clock, running: Callable[[], list[str]]) -> None:
         add(owned, *(Fake(f"a{i}", "a") for i in range(10)))
@@ -169,10 +100,13 @@ def test_an_owner_with_all_slots_gives_back_its_newest_ones() -> None:
         assert running() == [f"a{i}" for i in range(8)]  # nobody else waits
         bs = [Fake(f"b{i}", "b") for i in range(6)]
         add(owned, *bs)
-        await later(owned, clock, 9)
         assert running() == [f"a{i}" for i in range(8)]
+        await later(owned, clock, 1)  # as b has nothing
+        assert running() == [*(f"a{i}" for i in range(7)), "b0"]
+        await later(owned, clock, 8)
+        assert running() == [*(f"a{i}" for i in range(7)), "b0"]
         await later(owned, clock, 1)
-        assert running()[-1] == "b0" and "a7" not in running()
+        assert running() == [*(f"a{i}" for i in range(6)), "b0", "b1"]
         await later(owned, clock, 20)
         assert running() == ["a0", "a1", "a2", "a3", "b0", "b1", "b2", "b3"]
         await later(owned, clock, 60)
@@ -182,6 +116,8 @@ def test_an_owner_with_all_slots_gives_back_its_newest_ones() -> None:
             each.finished.set()
         await settled()
         # Its places are kept: those that gave way go on before the ones that have not begun.
+        assert running() == [f"a{i}" for i in range(7)]
+        await later(owned, clock, RECENT_S)  # for which the last place waits for b
         assert running() == [f"a{i}" for i in range(8)]
 
     scenario(8, test)
@@ -275,7 +211,6 @@ def test_memory_is_given_back_as_slots_are() -> None:
         for job in owned.running:
             job.give_way = lambda job=job: gives(job)
         add(owned, b)
-        await later(owned, clock, 9)
         assert running() == ["a0", "a1", "a2"]
         await later(owned, clock, 2)
         assert "b" in running() and "a0" in running()
