@@ -165,9 +165,9 @@ class Config(BaseSettings):
     max_connections: int = Field(
         1024, ge=2, description="Most connections at a time, streams included; one address has at most half of them."
     )
-    max_clients: int = Field(64, ge=1, description="Most streams at a time.")
+    max_clients: int = Field(64, ge=1, description="Most streams at a time; one key leaves half of them to others.")
     max_key_clients: int | None = Field(
-        None, ge=1, description="Most streams at a time of one key (default: no limit)."
+        None, ge=1, description="Most streams at a time of one key, within its share (default: that share)."
     )
     max_stream_memory: Bytes = Field(
         512 * MIB, ge=8, description="Most bytes of memory that the streams' scenes take as values; one's, an eighth."

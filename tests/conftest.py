@@ -48,7 +48,7 @@ STRICT = {
     "SUNBOX_API_KEY": ", ".join([*KEYS, SPARE_KEY]),
     "SUNBOX_APIKEY": "misspelt-key",
     "SUNBOX_LOG_FORMAT": "json",
-    "SUNBOX_MAX_CLIENTS": "2",
+    "SUNBOX_MAX_CLIENTS": "3",
     "SUNBOX_MAX_RUNNING": "1",
     "SUNBOX_MAX_QUEUE": "2",
     "SUNBOX_MAX_JOBS": "2",

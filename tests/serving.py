@@ -182,11 +182,10 @@ class Client:
         url: str,
         origin: str | None = None,
         session: str | None = None,
-        beside: str | None = None,
         key: str | None = None,
     ) -> None:
         self.url = url
-        given = {"session": session, "beside": beside}
+        given = {"session": session}
         query = urlencode({name: value for name, value in given.items() if value is not None})
         address = url.replace("http://", "ws://") + "/v1/stream" + (query and f"?{query}")
         offered = None if origin is None else Origin(origin)

@@ -56,7 +56,6 @@ export function laterParts({
           acts: editor,
           models: Object.keys(materialModels(schema.scene)),
           names: namesOf,
-          beside: () => stream.session,
           headerOfA: () => page.header,
         },
       ),

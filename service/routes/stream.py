@@ -26,8 +26,7 @@ async def stream(socket: WebSocket) -> None:
     try:
         info = await state.info()
         try:
-            query = socket.query_params
-            session = state.sessions.enter(query.get("session"), query.get("beside"), owner_of(socket))
+            session = state.sessions.enter(socket.query_params.get("session"), owner_of(socket))
         except ServiceError as error:
             code = CLOSE_CODES.get(type(error), LOST)
             return await socket.close(code, error.detail[:REASON_CHARACTERS])

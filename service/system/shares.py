@@ -18,7 +18,8 @@ class Shares:
     leave [Choudhury and Hahne 1998, dynamic queue length thresholds, alpha = 1]. So a caller that has nothing gets n
     units wherever 2 n are free; and as one caller alone leaves half of all free, another one's request for up to a
     quarter of `most` always succeeds beside it. When k callers take as much as they get, and take it again whenever
-    some is released, each has `most` / (k + 1), and as much remains free.
+    some is released, each has `most` / (k + 1), and as much remains free. Where less is free, a caller that has
+    nothing still gets a single unit: of few requests at a time the last one is for somebody who has none.
 
     `what` names the units in errors, as "uploads (SUNBOX_MAX_BODIES)". No caller gets more than `each` where it is
     given. For the event loop alone: there is no lock.
@@ -26,7 +27,8 @@ class Shares:
 
     def __init__(self, most: int, what: str, each: int | None = None, retry_s: int = RETRY_S) -> None:
         self._most = most
-        self._each = most // 2 if each is None else min(each, most // 2)
+        half = max(most // 2, min(1, most))
+        self._each = half if each is None else min(each, half)
         self._what = what
         self._retry_s = retry_s
         self._taken: Counter[str] = Counter()
@@ -35,7 +37,8 @@ class Shares:
     def check(self, caller: str, n: int = 1) -> None:
         """Raise what `take` would raise, and take nothing."""
         own = self._taken[caller]
-        share = min(self._each, (self._most - self.total + own) // 2)
+        free = self._most - self.total
+        share = min(self._each, max((free + own) // 2, min(1, free) if own == 0 else 0))
         if own + n <= share:
             return
         if n > self._each:

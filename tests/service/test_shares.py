@@ -37,13 +37,14 @@ def test_nobody_has_more_than_is_left_free() -> None:
             taken[name] -= n
         else:
             free = most - sum(taken.values()) - n
+            last = n == 1 and not taken[name] and free >= 0  # a single unit, for one that has none
             try:
                 shares.take(name, n)
                 taken[name] += n
-                assert taken[name] <= free
+                assert taken[name] <= free or last
             except (TooManyRequests, Unavailable):
                 refused += 1
-                assert taken[name] + n > free
+                assert taken[name] + n > free and not last
         assert {name: shares.of(name) for name in names} == taken and shares.total == sum(taken.values())
     assert refused > 100
 
@@ -60,6 +61,26 @@ def test_greedy_callers_end_with_equal_shares() -> None:
         whose = chance.choice([name for name in names if shares.of(name)])
         shares.release(whose)
     assert all(abs(shares.of(name) - 20) <= 3 for name in names)
+
+
+@pytest.mark.parametrize("most", [1, 2, 3, 7, 64])
+def test_the_last_unit_is_for_somebody_who_has_none(most: int) -> None:
+    """Of a few requests at a time, all are in use at last, and a caller alone has half of them, or the only one."""
+    shares = Shares(most, "streams")
+    alone = 0
+    while True:
+        try:
+            shares.take("a")
+            alone += 1
+        except TooManyRequests:
+            break
+    assert alone == max(1, most // 2)
+    for number in range(most - alone):
+        shares.take(f"other {number}")
+    with pytest.raises(Unavailable):
+        shares.take("late")
+    with pytest.raises(TooLarge):
+        Shares(0, "nothing").take("a", 2)
 
 
 def test_the_error_says_whose_units_are_the_cause() -> None:

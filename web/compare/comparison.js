@@ -25,15 +25,13 @@ export class Comparison {
   #wanted = null; // of the page's own stream, while something is compared
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor; `models` are
-  // those that B can be turned into; `names(aov, document)` of layers; `beside()` the session of A, `headerOfA()` that of
-  // its picture.
-  constructor(places, { first, acts, models, names, beside, headerOfA }) {
+  // those that B can be turned into; `names(aov, document)` of layers; `headerOfA()` that of A's picture.
+  constructor(places, { first, acts, models, names, headerOfA }) {
     Object.assign(this, places, { first, acts });
     this.needs = {
       first,
       acts,
       names,
-      beside,
       headerOfA,
       second: this.canvas,
       photograph: () => this.#photograph,

@@ -66,9 +66,8 @@ class Rendered {
   subject = null;
   #paused = false;
 
-  // `needs`: names(aov, document) of layers, beside() the session of the page's own stream, painted(), refused(problem,
-  // valid).
-  constructor(canvas, { names, beside, painted, refused }) {
+  // `needs`: names(aov, document) of layers, painted(), refused(problem, valid).
+  constructor(canvas, { names, painted, refused }) {
     this.canvas = canvas;
     canvas.width = canvas.height = 1; // nothing of an earlier one is left
     this.viewport = new Viewport(canvas, {
@@ -78,17 +77,15 @@ class Rendered {
         painted();
       },
     });
-    this.stream = new Stream(
-      {
-        hello: () => this.viewport.restart(),
-        frame: (header, bytes, view, acknowledge) => this.viewport.show(header, bytes, view, acknowledge),
-        done: painted,
-        waiting() {},
-        refused,
-        lost() {}, // the page's own stream says so
-      },
-      beside,
-    );
+    this.stream = new Stream({
+      hello: () => this.viewport.restart(),
+      frame: (header, bytes, view, acknowledge) => this.viewport.show(header, bytes, view, acknowledge),
+      done: painted,
+      waiting() {},
+      refused,
+      // Of what else goes wrong the page's own stream tells; that there is no room may hold for this one alone.
+      lost: (reason) => reason.full && refused(new Error("The server has no room for a second picture just now.")),
+    });
     this.stream.connect();
   }
 

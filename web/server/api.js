@@ -157,12 +157,11 @@ export function upload(file, progress) {
   });
 }
 
-// Where the stream is; `session` takes up one that was cut off, `beside` is the one that it is compared with.
-export function streamUrl(session, beside) {
+// Where the stream is; `session` takes up one that was cut off.
+export function streamUrl(session) {
   const url = new URL("stream", root);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   if (session) url.searchParams.set("session", session);
-  else if (beside) url.searchParams.set("beside", beside);
   return url.href;
 }
 

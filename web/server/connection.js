@@ -33,6 +33,7 @@ const REASONS = {
   4429: {
     title: "The server is full.",
     detail: "Your scene is safe here; the picture comes as soon as somebody leaves.",
+    full: true,
   },
   4500: { title: "The server lost its renderer.", detail: "Your scene is safe here." },
 };
@@ -50,10 +51,8 @@ export class Connection {
   #closed = false;
 
   // `on` has text(message), bytes(buffer), lost(reason {title, detail, key}, wait_ms; null: no further try).
-  // `beside()` is the session of the stream that this one is compared with.
-  constructor(on, beside) {
+  constructor(on) {
     this.#on = on;
-    this.beside = beside;
     this.watch = setInterval(() => this.#watch(), WATCH_MS);
     window.addEventListener("online", () => this.retry());
     window.addEventListener("pageshow", (event) => {
@@ -66,7 +65,7 @@ export class Connection {
 
   open() {
     clearTimeout(this.#timer);
-    const socket = new WebSocket(streamUrl(this.#session, this.beside?.()), streamProtocols());
+    const socket = new WebSocket(streamUrl(this.#session), streamProtocols());
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }) => {
       if (socket !== this.#socket) return;

@@ -42,22 +42,14 @@ export class Stream {
 
   // `on` has hello(info), frame(header, bytes, view, acknowledge), waiting(bool), refused(problem, valid),
   // done(message), lost(reason, wait_ms or null).
-  // `beside()`: the session of the same page's other stream, where there is one.
-  constructor(on, beside) {
+  constructor(on) {
     this.#on = on;
-    this.#connection = new Connection(
-      {
-        text: (heard) => this.#hear(heard),
-        bytes: (buffer) => this.#receive(buffer),
-        lost: (reason, wait) => this.#lose(reason, wait),
-      },
-      beside,
-    );
+    this.#connection = new Connection({
+      text: (heard) => this.#hear(heard),
+      bytes: (buffer) => this.#receive(buffer),
+      lost: (reason, wait) => this.#lose(reason, wait),
+    });
     document.addEventListener("visibilitychange", this.#hide);
-  }
-
-  get session() {
-    return this.#session;
   }
 
   // The scene with its names in the server's order, by which its layers number them.

@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed
 
 from service.assets import Assets
 from service.config import Config
-from service.problems import NotFound, TooManyRequests
+from service.problems import NotFound, TooManyRequests, Unavailable
 from service.renderers.local.supervisor import Supervisor
 from service.requests.request_reader import RequestReader
 from service.streams import sessions
@@ -160,41 +160,19 @@ def test_all_streams_of_a_key_share_its_part() -> None:
     asyncio.run(test())
 
 
-def test_two_variants_count_as_one_client() -> None:
-    async def test() -> None:
-        supervisor: Any = Supervisor()
-        supervisor.open = lambda listener, client="": 1
-        kept = Sessions(supervisor, READER, most=1)
-        first = kept.enter(None)
-        second = kept.enter(None, first.id)
-        assert kept.attended == 1
-        for beside in (None, first.id, second.id, "nobody"):
-            with pytest.raises(TooManyRequests):
-                kept.enter(None, beside)
-        kept.leave(second)
-        assert kept.enter(second.id) is second
-        kept.leave(first)
-        assert kept.attended == 1, "the first is gone: now the second is the client"
-        kept.close("the end")
-
-    asyncio.run(test())
-
-
 def test_a_session_belongs_to_its_key(strict: Server) -> None:
-    """Whoever has read its id somewhere else neither takes it up, nor has a second one beside it."""
+    """Whoever has read its id somewhere else does not take it up."""
     anna, bert = KEYS
-    with Client(strict.url, key=anna) as filling:  # there may be two clients
-        filling.until("hello")
-        first = Client(strict.url, key=anna)
-        session = first.until("hello")[0]["session"]
-        assert closed_with(Client(strict.url, session=session, key=bert)) == 4404
-        assert closed_with(Client(strict.url, beside=session, key=bert)) == 4429
-        with Client(strict.url, beside=session, key=anna):
-            pass
-        again = Client(strict.url, session=session, key=anna)  # its own place
-        with again:
-            assert again.until("hello")[0]["session"] == session
-        assert closed_with(first) == 4409
+    first = Client(strict.url, key=anna)
+    session = first.until("hello")[0]["session"]
+    assert closed_with(Client(strict.url, session=session, key=bert)) == 4404
+    assert closed_with(Client(strict.url, key=anna)) == 4429, "one of three is her share"
+    with Client(strict.url, key=bert) as other:
+        other.until("hello")
+    again = Client(strict.url, session=session, key=anna)  # its own place
+    with again:
+        assert again.until("hello")[0]["session"] == session
+    assert closed_with(first) == 4409
     log = strict.log.read_text()
     assert session not in log and not any(key in log for key in KEYS)
 
@@ -205,20 +183,44 @@ def test_one_key_does_not_take_all_places() -> None:
     async def test() -> None:
         supervisor: Any = Supervisor()
         supervisor.open = lambda listener, client="": 1
-        kept = Sessions(supervisor, READER, most=3, each=2)
+        kept = Sessions(supervisor, READER, most=4)
         annas = [kept.enter(None, owner="anna") for _ in range(2)]
-        with pytest.raises(TooManyRequests, match="SUNBOX_MAX_KEY_CLIENTS"):
+        with pytest.raises(TooManyRequests, match="Your own streams"):
             kept.enter(None, owner="anna")
-        second = kept.enter(None, annas[0].id, "anna")  # beside the first, they count as one
-        bert = kept.enter(None, owner="bert")
+        bert, carl = (
+            kept.enter(None, owner="bert"),
+            kept.enter(None, owner="carl"),
+        )  # the last one is for who has none
         with pytest.raises(TooManyRequests, match="SUNBOX_MAX_CLIENTS"):
-            kept.enter(None, owner="carl")
-        for session in (bert, second, *annas):
+            kept.enter(None, owner="doris")
+        for session in (bert, carl, *annas):
             kept.leave(session)
+        assert kept.attended == 0
         for _ in range(5):  # Anna comes and goes
             kept.leave(kept.enter(None, owner="anna"))
         assert kept.enter(bert.id, owner="bert") is bert
+        bounded = Sessions(supervisor, READER, most=8, each=1)
+        bounded.enter(None, owner="anna")
+        with pytest.raises(TooManyRequests, match="SUNBOX_MAX_KEY_CLIENTS"):
+            bounded.enter(None, owner="anna")
         others = Sessions(supervisor, READER, most=3, each=1)
         assert len({others.enter(None).id for _ in range(3)}) == 3  # without keys each is its own client
+
+    asyncio.run(test())
+
+
+def test_a_stream_that_cannot_begin_takes_no_place() -> None:
+    async def test() -> None:
+        supervisor: Any = Supervisor()
+
+        def refuse(listener: Any, client: str = "") -> int:
+            raise Unavailable("nothing renders")
+
+        supervisor.open = refuse
+        kept = Sessions(supervisor, READER, most=2)
+        for _ in range(3):
+            with pytest.raises(Unavailable):
+                kept.enter(None, owner="anna")
+        assert kept.attended == 0
 
     asyncio.run(test())
