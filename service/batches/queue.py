@@ -67,7 +67,7 @@ class BatchQueue:
 
     def _check_number(self, batch: Batch) -> None:
         """Raise TooManyRequests where an owner's batches have more renders than are kept once they have ended."""
-        others, kept = self._under_way(batch.owner), self._renders.kept_of_each
+        others, kept = self._under_way(batch.owner), self._renders.limits.retention.kept
         if others and batch.counts_as + sum(each.counts_as for each in others) > kept:
             renders, most = sum(each.order.renders for each in others), kept * RENDERS_OF_ONE
             detail = (

@@ -42,18 +42,18 @@ class RenderQueue:
 
     def __init__(self, limits: QueueLimits, store: RenderStore | None = None) -> None:
         """With a `store` renders outlive the server."""
-        self._limits = limits
+        self.limits = limits
         self.store = store
         self._jobs: dict[str, Job] = {}  # in the order of arrival
         self._followers = Followers[Job]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
-        self._slots = Slots(self._limits.running, self._ran)
+        self._slots = Slots(self.limits.running, self._ran)
         self._waiting = self._slots.waiting
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
-        self._documents = WaitingDocuments(self._limits.disk_bytes)
-        self._kept: KeptRenders[Job | InBatch] = KeptRenders(self._limits.retention)
+        self._documents = WaitingDocuments(self.limits.disk_bytes)
+        self._kept: KeptRenders[Job | InBatch] = KeptRenders(self.limits.retention)
         self.resting = Resting()
         self._chores = Background()
         self._timer: asyncio.TimerHandle | None = None
@@ -150,12 +150,12 @@ class RenderQueue:
             raise Unavailable("The server is shutting down.", RETRY_S)
         own = self._waiting.count(owner) + self._storing[owner]
         active = own + sum(job.owner == owner for job in self._slots.running)
-        if active >= self._limits.each:
-            detail = f"{active} renders of yours are under way: no more than {self._limits.each} (SUNBOX_MAX_JOBS)"
+        if active >= self.limits.each:
+            detail = f"{active} renders of yours are under way: no more than {self.limits.each} (SUNBOX_MAX_JOBS)"
             raise TooManyRequests(detail, RETRY_S)
         # A queue that is full still takes renders of owners with less than their share of it.
-        share = self._limits.waiting // max(1, len(self._waiting.owners) + (own == 0))
-        if self.queued >= self._limits.waiting and own >= share:
+        share = self.limits.waiting // max(1, len(self._waiting.owners) + (own == 0))
+        if self.queued >= self.limits.waiting and own >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 
     def get(self, id: str, owner: str = "") -> Job:
@@ -211,11 +211,6 @@ class RenderQueue:
     @property
     def kept(self) -> int:
         return len(self._kept)
-
-    @property
-    def kept_of_each(self) -> int:
-        """How many ended renders of one owner are kept."""
-        return self._limits.retention.kept
 
     def _know(self, job: Job) -> None:
         """Find it by its id from now on, and its picture where memory is taken from."""

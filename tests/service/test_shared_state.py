@@ -44,10 +44,11 @@ THREADS = 8
 CHANGED = {
     "renderers/ray/gateway.py _written": "appended to by one thread, and read as a whole",
     "renders/store/fitting.py _adapters": "the same value under a key, whoever makes it",
-    "routes/submission.py _turns": "of the event loop",
+    "routes/idempotency.py _turns": "of the event loop",
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",
+    "system/priority.py _steps": "set once, before there are threads",
     "system/shared_memory.py _blocks": "a lock for changes; listed by `copy`, which is one step of the interpreter",
     "worker/view/view_tables.py _baked": "of the renderer's thread",
 }
@@ -178,7 +179,8 @@ def _pack_cache(folder: Path) -> Hammer:
 
 def _packed_scenes(folder: Path) -> Hammer:
     scenes = PackedScenes(1000)
-    kept: list[Any] = [SimpleNamespaceScene(scenes) for _ in range(20)]
+    scene: Any = type("Scene", (), {"forget": lambda self: scenes.remove(self)})
+    kept = [scene() for _ in range(20)]
 
     def turn(i: int) -> None:
         scenes.keep(kept[i % 20], i % 90)
@@ -187,11 +189,6 @@ def _packed_scenes(folder: Path) -> Hammer:
         scenes.shrink(i % 50)
 
     return turn, lambda: scenes.bytes == sum(scenes._scenes.values()) <= 1000
-
-
-class SimpleNamespaceScene:
-    def __init__(self, scenes: PackedScenes) -> None:
-        self.forget = lambda: scenes.remove(self)  # type: ignore[arg-type]
 
 
 def _pictures(folder: Path) -> Hammer:
@@ -260,13 +257,10 @@ def _asset_shares(folder: Path) -> Hammer:
 
 
 def _children(folder: Path) -> Hammer:
-    class Process:
-        def poll(self) -> None: ...
-
     class Stand:
         """In place of a child that is there already."""
 
-        is_spent, given, process = False, 0, Process()
+        is_spent, given, process = False, 0, SimpleNamespace(poll=lambda: None)
 
         def __init__(self) -> None:
             self.mine = threading.Lock()
