@@ -28,6 +28,7 @@ from service.requests.request_parser import RequestParser, unfolded
 from service.scene import MeshShape, load_json
 from service.scene.text import most_bytes, weigh
 from service.system.child_processes import Child
+from service.system.turns import CALLER
 from tests.serving import SCENE, SMALL
 
 ROWS = [[0.5 * i, i % 7, -1e-3 * i] for i in range(3000)]
@@ -213,6 +214,29 @@ def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
     for thread in threads:
         thread.join(30)
     assert order == ["large", "small"]
+
+
+def test_room_goes_round_callers() -> None:
+    """A second large body of one caller waits for the first one; another caller's does not wait for the second."""
+    room, order = parser_pool._Room(10), list[str]()
+    pause = threading.Event()
+
+    def take(name: str) -> None:
+        CALLER.set(name[0])
+        with room.taken(10):
+            order.append(name)
+
+    CALLER.set("a")
+    with room.taken(10):
+        threads = [threading.Thread(target=take, args=(name,)) for name in ("a2", "a3", "b1")]
+        for number, thread in enumerate(threads):
+            thread.start()
+            while len(room._waiting) <= number:
+                pause.wait(0.001)
+    CALLER.set("")
+    for thread in threads:
+        thread.join(30)
+    assert order == ["b1", "a2", "a3"]
 
 
 class Taken:
