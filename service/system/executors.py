@@ -38,13 +38,14 @@ class Pool:
 
     Turns go round the callers that have work here, and then in the order of arrival: a caller with much work delays
     itself alone. None has more than `each` threads at a time: if work of minutes took all of them, nobody else would
-    have a turn until it ended.
+    have a turn until it ended. So a pool has one thread more than one caller alone needs.
     """
 
     def __init__(self, name: str, threads: int, niceness: int = 0, each: int | None = None) -> None:
+        """By default a caller has all threads but one, or the only one."""
         self._threads = ThreadPoolExecutor(threads, name, _yield_to_others, (niceness,))
         self._most = threads
-        self._each = threads if each is None else each
+        self._each = max(1, threads - 1) if each is None else each
         self._lock = threading.Lock()
         self._waiting = dict[str, deque[_Work]]()  # by caller; the first one's turn is next
         self._running: Counter[str] = Counter()  # works, by caller
@@ -87,23 +88,23 @@ class Pool:
             return work
 
 
-parsing = Pool("parsing", 2, NICENESS)  # small bodies: milliseconds
-waiting_for_parsers = Pool("waiting", 3, each=2)  # waits for processes that parse large bodies: seconds
-packing = Pool("packing", 3, NICENESS, each=2)  # scenes: seconds for the largest
-storing = Pool("storing", 3, NICENESS, each=2)  # assets, which are parsed and hashed first: minutes for the largest
-storing_small = Pool("small", 3, NICENESS, each=2)  # those of up to a megabyte: milliseconds
-opening = Pool("opening", 3, NICENESS, each=2)  # finds assets and keeps them from being deleted: milliseconds
-saving = Pool("saving", 2)  # documents: the disk's time
-encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, while a person watches
-writing = Pool("writing", 2, WRITING_NICENESS)  # pictures to files: seconds for the largest
-comparing = Pool("comparing", 2, WRITING_NICENESS)  # pictures: seconds for the largest
+parsing = Pool("parsing", 3, NICENESS)  # small bodies: milliseconds
+waiting_for_parsers = Pool("waiting", 3)  # waits for processes that parse large bodies: seconds
+packing = Pool("packing", 3, NICENESS)  # scenes: seconds for the largest
+storing = Pool("storing", 3, NICENESS)  # assets, which are parsed and hashed first: minutes for the largest
+storing_small = Pool("small", 3, NICENESS)  # those of up to a megabyte: milliseconds
+opening = Pool("opening", 3, NICENESS)  # finds assets and keeps them from being deleted: milliseconds
+saving = Pool("saving", 3)  # documents: the disk's time
+encoding = Pool("encoding", 3)  # frames to JPEG and the like: milliseconds, while a person watches
+writing = Pool("writing", 3, WRITING_NICENESS)  # pictures to files: seconds for the largest
+comparing = Pool("comparing", 3, WRITING_NICENESS)  # pictures: seconds for the largest
 recording = Pool("recording", 1)  # the rows of renders, in order: the disk's time
 saving_pictures = Pool("pictures", 1)  # small ones of renders to the disk and back: milliseconds
 saving_large_pictures = Pool("large", 1, NICENESS)  # seconds for the largest, while others' renders end
 reading_large_pictures = Pool("reading", 1)  # for which somebody waits
 resolving = Pool("resolving", 4)  # names of hosts that are told of ends: seconds where a name server is silent
-sending = Pool("sending", 2)  # scenes to the renderer: copied to shared memory
-tending = Pool("tending", 2)  # ends and replaces renderers, and restores what they had rendered
+sending = Pool("sending", 3)  # scenes to the renderer: copied to shared memory
+tending = Pool("tending", 3)  # ends and replaces renderers, and restores what they had rendered
 measuring = Pool("measuring", 1)  # /metrics
 
 
