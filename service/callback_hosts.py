@@ -59,11 +59,7 @@ class CallbackHosts:
         """Where that callback would go. Raises ValueError, whose text is for the caller."""
         if not self.origins:
             raise ValueError("this server sends no callbacks; its operator names the hosts in SUNBOX_CALLBACK_HOSTS")
-        try:
-            parts = urlsplit(url)
-            found = Origin(parts.scheme, (parts.hostname or "").rstrip("."), parts.port or PORTS[parts.scheme])
-        except (ValueError, KeyError):
-            raise ValueError("must be an https URL") from None
+        found, parts = origin_of(url), urlsplit(url)
         if not found.host or not _PRINTABLE.fullmatch(url) or "\\" in url:
             raise ValueError("must be an https URL, with what is not ASCII percent-encoded")
         if parts.username is not None or parts.password is not None:
@@ -81,6 +77,15 @@ class CallbackHosts:
             return self.allows(inner)
         unicast = address.version == 4 or address in GLOBAL_UNICAST
         return unicast and address.is_global and not address.is_multicast
+
+
+def origin_of(url: str) -> Origin:
+    """Where a URL leads, however its host and port are written. Raises ValueError, whose text is for the caller."""
+    try:
+        parts = urlsplit(url)
+        return Origin(parts.scheme, (parts.hostname or "").rstrip("."), parts.port or PORTS[parts.scheme])
+    except (ValueError, KeyError):
+        raise ValueError("must be an https URL") from None
 
 
 def secret_key(secret: str) -> bytes:

@@ -4,6 +4,7 @@ servers."""
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import random
 import time
@@ -25,11 +26,15 @@ from service.storage.callback_rows import Callback, CallbackRows, Kind
 from service.storage.database import Database
 from service.system.background import Background, reported
 from service.system.executors import recording, resolving
+from service.system.shares import Shares
+from service.system.turns import CALLER
 
 if TYPE_CHECKING:
     import ssl
 
-AT_ONCE, OF_ONE_HOST = 8, 2  # attempts: a host that does not answer leaves room for the others
+AT_ONCE = 16  # attempts, of which an owner has its share: half of what others leave
+OF_ONE_HOST = 2  # of these: a host that does not answer leaves room for the others
+SILENCES = 3  # attempts in a row without an answer, after which a host has one at a time
 EACH = 10_000  # callbacks of one owner that have not ended
 RETRY_S = 60  # when to ask again where an owner has as many
 # Seconds between the eight attempts, half a day in all: a render is kept for a day, so that who is told can still
@@ -57,6 +62,8 @@ class Callbacks:
         self.outcomes: Counter[str] = Counter()  # of attempts: delivered, retried, failed
         self._pending: Counter[str] = Counter()  # that have not ended, by owner
         self._sending = dict[str, Callback]()  # by id
+        self._turns, self._last = itertools.count(1), Counter[str]()  # the turn that each owner had last
+        self._silences: Counter[str] = Counter()  # of hosts, since their last answer
         self._tasks = Background()
         self._woken = asyncio.Event()
         self._secrets: list[str] = []
@@ -137,29 +144,45 @@ class Callbacks:
 
     async def _begin(self) -> float:
         """Begin all attempts that are due and have room; the seconds until the next one."""
-        while len(self._sending) < AT_ONCE:
+        while owners := self._owners():
             busy = Counter(each.host for each in self._sending.values())
-            full = [host for host, attempts in busy.items() if attempts >= OF_ONE_HOST]
-            found = await recording(partial(self._rows.next, full, list(self._sending)))
-            left = LONGEST_S if found is None else (found.next_at or 0.0) - time.time()
+            full = [host for host, attempts in busy.items() if attempts >= self._most_of(host)]
+            now = time.time()
+            found = await recording(partial(self._rows.next, owners, full, list(self._sending), now))
+            left = LONGEST_S if found is None else (found.next_at or 0.0) - now
             if found is None or left > 0:
                 return min(left, LONGEST_S)
             self._sending[found.id] = found
+            self._last[found.owner] = next(self._turns)
             self._tasks.start(CALLBACK, self._attempt(found), partial(self._try_later, found))
         return LONGEST_S
+
+    def _owners(self) -> list[str]:
+        """Those who may have another attempt: who has fewest comes first, then whose turn was the longest ago."""
+        shares = Shares(AT_ONCE, "attempts")
+        for each in self._sending.values():
+            shares.count(each.owner)
+        able = (owner for owner, count in self._pending.items() if count > 0 and shares.has_room(owner))
+        return sorted(able, key=lambda owner: (shares.of(owner), self._last[owner]))
+
+    def _most_of(self, host: str) -> int:
+        return 1 if self._silences[host] >= SILENCES else OF_ONE_HOST
 
     async def _attempt(self, callback: Callback) -> None:
         from service.callbacks import posting
 
+        CALLER.set(callback.owner)  # whose turns at threads these are
         answer, error = None, None
         try:
             body, now = (callback.body or "").encode(), time.time()
             headers = signing.headers(callback.id, int(now), body, self._secrets)
             assert self._tls is not None
             answer = await posting.post(callback.url, body, headers, self._hosts, self._tls)
+            self._silences.pop(callback.host, None)
             if not 200 <= answer < 300:
                 error = f"it answered {answer}" + (", and redirects are not followed" if answer // 100 == 3 else "")
         except posting.NotSent as reason:
+            self._silences[callback.host] += 1
             error = str(reason)
         except Exception:
             log.exception("a callback could not be sent")

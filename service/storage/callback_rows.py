@@ -5,11 +5,11 @@ from __future__ import annotations
 import secrets
 import sqlite3
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
-from urllib.parse import urlsplit
 
+from service.callback_hosts import origin_of
 from service.storage.database import Database
 
 KEPT = 1000  # delivered ones of one owner, and as many failed ones
@@ -32,7 +32,7 @@ class Callback:
     owner: str
     kind: Kind
     subject: str  # the id of the render or batch
-    host: str
+    host: str  # the same for all ways to write it, with its port where that is not the scheme's
     url: str
     state: State  # waiting: its render goes on; due: to be sent, or sent again
     attempts: int
@@ -52,7 +52,7 @@ def insert(
         database.execute(
             "INSERT INTO callbacks (id, owner, kind, subject, host, url, state, created_at) "
             "VALUES (?, ?, ?, ?, ?, ?, 'waiting', ?)",
-            (f"msg_{secrets.token_hex(12)}", owner, kind, subject, urlsplit(url).netloc.lower(), url, created_at),
+            (f"msg_{secrets.token_hex(12)}", owner, kind, subject, str(origin_of(url)), url, created_at),
         )
 
 
@@ -85,17 +85,26 @@ class CallbackRows:
                 (body, now, kind, subject),
             )
 
-    def next(self, hosts: Collection[str], ids: Collection[str]) -> Callback | None:
-        """The due one whose attempt comes first, but for those of these hosts and of these ids."""
+    def next(
+        self, owners: Sequence[str], hosts: Collection[str], ids: Collection[str], now: float
+    ) -> Callback | None:
+        """The one that is due first, of the first of these owners that has one which is due by now; where none has,
+        the one that will be due first. Those of `hosts` and of `ids` are left out."""
+        later: Callback | None = None
         with self._database.open() as database:
-            found = _found(
-                database,
-                f"WHERE state = 'due' AND host NOT IN ({_marks(hosts)}) AND id NOT IN ({_marks(ids)}) "
-                "ORDER BY next_at LIMIT 1",
-                *hosts,
-                *ids,
-            )
-        return found[0] if found else None
+            for owner in owners:
+                found = _found(
+                    database,
+                    f"WHERE state = 'due' AND owner = ? AND host NOT IN ({_marks(hosts)}) "
+                    f"AND id NOT IN ({_marks(ids)}) ORDER BY next_at LIMIT 1",
+                    owner,
+                    *hosts,
+                    *ids,
+                )
+                if found and _next_at(found[0]) <= now:
+                    return found[0]
+                later = min((each for each in (later, *found) if each is not None), key=_next_at, default=None)
+        return later
 
     def attempted(self, callback: Callback) -> None:
         """Store what became of it. Of ended ones the oldest are deleted."""
@@ -129,6 +138,10 @@ class CallbackRows:
                 "(SELECT number FROM callbacks WHERE owner = ?1 AND id = ?3)) ORDER BY number DESC LIMIT ?4",
                 owner, state, after, limit,
             )  # fmt: skip
+
+
+def _next_at(callback: Callback) -> float:
+    return callback.next_at or 0.0
 
 
 def _found(database: sqlite3.Connection, condition: str, *values: object) -> list[Callback]:

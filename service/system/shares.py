@@ -36,9 +36,7 @@ class Shares:
 
     def check(self, caller: str, n: int = 1) -> None:
         """Raise what `take` would raise, and take nothing."""
-        own = self._taken[caller]
-        free = self._most - self.total
-        share = min(self._each, max((free + own) // 2, min(1, free) if own == 0 else 0))
+        own, share = self._taken[caller], self._share(caller)
         if own + n <= share:
             return
         if n > self._each:
@@ -49,6 +47,14 @@ class Shares:
                 self._retry_s,
             )
         raise Unavailable(f"There is no room for more {self._what} just now.", self._retry_s)
+
+    def has_room(self, caller: str, n: int = 1) -> bool:
+        """Whether `take` would take `n` units."""
+        return self._taken[caller] + n <= self._share(caller)
+
+    def _share(self, caller: str) -> int:
+        own, free = self._taken[caller], self._most - self.total
+        return min(self._each, max((free + own) // 2, min(1, free) if own == 0 else 0))
 
     def take(self, caller: str, n: int = 1) -> None:
         """Give `caller` another `n` units, which it has until they are released.

@@ -18,6 +18,7 @@ from service.config import Config
 from service.problems import InvalidDocument, NotFound, TooManyRequests
 from service.storage.callback_rows import KEPT, Callback, CallbackRows, insert
 from service.storage.database import Database
+from service.system.turns import CALLER
 from sunbox import Client
 from tests.calls import is_problem, metrics
 from tests.service.receiving import Heard, Receiver
@@ -168,11 +169,11 @@ def test_callbacks_outlive_the_server(calling: Server, listening: Receiver) -> N
         assert Webhook(SECRET).verify(heard.body, heard.headers)
 
 
-def filled(folder: Path, subjects: dict[str, str]) -> CallbackRows:
+def filled(folder: Path, subjects: dict[str, str], owner: str = "") -> CallbackRows:
     """Callbacks that are due, by subject to these URLs."""
     with Database(folder).open() as database, database:
         for subject, url in subjects.items():
-            insert(database, "render", subject, "", url, 1.0)
+            insert(database, "render", subject, owner, url, 1.0)
     rows = CallbackRows(Database(folder))
     for subject in subjects:
         rows.make_due("render", subject, "{}", time.time())
@@ -212,10 +213,84 @@ def test_a_host_that_does_not_answer_leaves_room_for_others(tmp_path: Path, monk
     assert [each.subject for each in rows.listed("", "delivered", 10, None)] == ["last"]
 
 
+def test_a_host_is_the_same_however_it_is_written(tmp_path: Path) -> None:
+    urls = (
+        "http://h.example:8328/",
+        "http://H.example:08328/a",
+        "http://h.example.:8328",
+        "http://h.example:008328/?b",
+    )
+    rows = filled(tmp_path, {str(i): url for i, url in enumerate(urls)})
+    assert {each.host for each in rows.listed("", None, 10, None)} == {"h.example:8328"}
+
+
+def test_turns_go_round_owners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever has thousands that are due, to whichever hosts, delays itself: also where none of these answers."""
+    hosts = [f"silent{i}.example" for i in range(AT_ONCE)]
+    anna = {f"{i:03}": f"https://{hosts[i % AT_ONCE]}/" for i in range(100)}
+    filled(tmp_path, anna, "anna")
+    rows = filled(tmp_path, {"first": f"https://{hosts[0]}/bert", "second": f"https://{hosts[1]}/bert"}, "bert")
+    attempts, delivered = list[str](), list[str]()
+
+    async def fake(url: str, *arguments: Any) -> int:
+        attempts.append(CALLER.get())
+        if not url.endswith("bert"):
+            await asyncio.sleep(1e9)
+        delivered.append(url)
+        return 200
+
+    monkeypatch.setattr(posting, "post", fake)
+
+    async def run() -> None:
+        callbacks = Callbacks(Config(data_dir=tmp_path, callback_hosts=hosts), missing)
+        await callbacks.start()
+        while len(rows.listed("bert", "delivered", 10, None)) < 2 or attempts.count("anna") < AT_ONCE // 2:
+            await asyncio.sleep(0.01)
+        await callbacks.close()
+
+    asyncio.run(asyncio.wait_for(run(), 60))
+    assert attempts.count("anna") == AT_ONCE // 2 and attempts.index("bert") <= 1
+
+
+def test_a_host_that_is_silent_has_one_attempt_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = filled(tmp_path, {f"{i}": "https://silent.example/" for i in range(9)})
+    under_way, most, silent = 0, list[int](), True
+
+    async def fake(url: str, *arguments: Any) -> int:
+        nonlocal under_way
+        under_way += 1
+        most.append(under_way)
+        await asyncio.sleep(0.01)
+        under_way -= 1
+        if silent:
+            raise posting.NotSent("no answer within 15 s")
+        return 200
+
+    monkeypatch.setattr(posting, "post", fake)
+
+    async def run() -> None:
+        nonlocal silent
+        callbacks = Callbacks(Config(data_dir=tmp_path, callback_hosts=["silent.example"]), missing)
+        await callbacks.start()
+        while callbacks.outcomes["retried"] < 9:
+            await asyncio.sleep(0.01)
+        silent = False
+        assert callbacks._most_of("silent.example") == 1
+        filled(tmp_path, {"late": "https://silent.example/"})
+        callbacks._woken.set()
+        while not rows.listed("", "delivered", 10, None):
+            await asyncio.sleep(0.01)
+        assert callbacks._most_of("silent.example") == OF_ONE_HOST
+        await callbacks.close()
+
+    asyncio.run(asyncio.wait_for(run(), 60))
+    assert max(most[:3]) == OF_ONE_HOST and set(most[5:]) == {1}
+
+
 def test_eight_attempts_are_made(tmp_path: Path) -> None:
     rows = filled(tmp_path, {"a": "https://hooks.example.org/"})
     callbacks = Callbacks(Config(data_dir=tmp_path, callback_hosts=["hooks.example.org"]), missing)
-    callback: Callback | None = rows.next([], [])
+    callback: Callback | None = rows.next([""], [], [], time.time())
     assert callback is not None
     for pause in PAUSES:
         now = time.time()
@@ -232,7 +307,7 @@ def test_what_is_kept_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     rows = filled(tmp_path, {str(i): "https://hooks.example.org/" for i in range(5)})
     callbacks = Callbacks(Config(data_dir=tmp_path, callback_hosts=["hooks.example.org"]), missing)
     for answer in (410, 200, 200, 200, 200):
-        found = rows.next([], [])
+        found = rows.next([""], [], [], time.time())
         assert found is not None
         rows.attempted(callbacks._after(found, answer, None if answer == 200 else "it answered 410"))
     assert [each.subject for each in rows.listed("", None, 10, None)] == ["4", "3", "0"]
