@@ -250,7 +250,7 @@ class Config(BaseSettings):
         "(default: no limit).",
     )
     max_key_documents: Bytes | None = Field(
-        None, ge=1, description="Most bytes of the documents that one key has saved (default: no limit)."
+        None, ge=1, description="Most bytes of one key's saved documents (default: a share of a fourth of the quota)."
     )
     keep_renders: int = Field(2_000, ge=1, description="Most ended renders that are kept for each key.")
     keep_bytes: Bytes = Field(4 * GIB, ge=1, description="Most bytes on the disk of the ended renders of all keys.")

@@ -88,12 +88,21 @@ def _matches(tags: tuple[str, ...], body: bytes | None) -> bool:
 class Documents:
     """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
 
-    `quota` makes room for documents; without one there is no bound. `each`: most bytes of one owner's documents. An
-    owner is a text; "" has no such bound, and what it saves is shared by default.
+    `quota` makes room for documents; without one there is no bound. `each`: most bytes of one owner's documents; by
+    default its share of the `most` bytes of those of all owners, which is half of what others leave. An owner is a
+    text; "" has no such bound, and what it saves is shared by default.
     """
 
-    def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None, each: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        assets: AssetStore,
+        quota: Quota | None = None,
+        each: int | None = None,
+        most: int | None = None,
+    ) -> None:
         self._each = each
+        self._most = most
         self._database = Database(folder)
         self._access = AssetAccess(folder, assets)
         self._quota = quota
@@ -226,12 +235,18 @@ class Documents:
 
     def _check_share(self, database: sqlite3.Connection, owner: str, more: int) -> None:
         """Raises TooLarge where an owner's documents would take too much with `more` bytes."""
-        if self._each is None or not owner or more <= 0:
+        if not owner or more <= 0:
             return
-        (bytes,) = database.execute("SELECT total(bytes) FROM documents WHERE owner = ?", (owner,)).fetchone()
-        if bytes + more > self._each:
+        sizes = (
+            "SELECT total(bytes) FILTER (WHERE owner = ?1), total(bytes) FILTER (WHERE owner <> ?1) FROM documents"
+        )
+        own, others = map(int, database.execute(sizes, (owner,)).fetchone())
+        most = self._each
+        if most is None and self._most is not None:
+            most = max(0, self._most - others) // 2
+        if most is not None and own + more > most:
             raise TooLarge(
-                f"With it your saved documents would take {int(bytes) + more} bytes; {self._each} are allowed "
+                f"With it your saved documents would take {own + more} bytes; {most} are allowed "
                 "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
             )
 

@@ -35,6 +35,7 @@ class Storage:
         self.shares.clear()
 
 
+DOCUMENTS_PART = 4  # all keys' documents take a quarter of the quota, so that pictures of others can be stored
 RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
 
 
@@ -55,7 +56,8 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
         reserve_bytes(config.data_quota),
     )
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
-    documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
+    most = config.data_quota // DOCUMENTS_PART
+    documents = Documents(config.data_dir, assets, quota, config.max_key_documents, most)
     shares = AssetShares(config.data_dir, quota, config.max_key_assets)
     return Storage(assets, documents, quota, shares, AssetAccess(config.data_dir, assets))
 
