@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import re
 import tempfile
@@ -57,9 +56,9 @@ async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequenc
             except (Conflict, Gone):
                 continue
             assert written is not None  # as nobody says that the client has gone
-            data = await asyncio.to_thread(_whole, written)
+            data = await writing(partial(_whole, written))
             entry = zipfile.ZipInfo(f"{_file_name(batch, step, job)}.{query.format}", _date(job))
-            await asyncio.to_thread(archive.writestr, entry, data)
+            await writing(partial(archive.writestr, entry, data))
             yield sent.taken()
     yield sent.taken()
 
