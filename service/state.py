@@ -158,7 +158,7 @@ class AppState:
         `count` is called with the bytes of memory that parsing takes, before parsing begins."""
         body = await packing(lambda: bytearray(unfolded(document), "ascii"))
         count(await packing(partial(self.bodies.memory_for, body)))
-        scene: Scene = await self.bodies.parsed("scene", body, counted=True)
+        scene: Scene = await self.bodies.parsed("scene", body)
         return await packing(partial(self.reader.pack, scene, owner=owner))
 
     async def gpu_missing(self) -> str | None:

@@ -203,6 +203,7 @@ class BatchQueue:
             await self._renders.submit_member(job, batch, step)
         except (TooManyRequests, Unavailable) as error:
             job.wait(error)
+            job.scene.wait_as_document()
             return False
         finally:
             batch.queueing = False

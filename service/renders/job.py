@@ -127,6 +127,7 @@ class Job(Ordered):
         """Have the renderer forget it."""
         self.viewer.close()
         self.rendering.release()
+        self.scene.forget_document()
 
     def rest(self) -> bool:
         """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""

@@ -71,6 +71,11 @@ class RenderMemory:
             scenes = COPIES * self.scene_bytes
             self._budget.hold_all(self, {"pictures": self._pictures, "scenes": scenes, "bodies": reading})
 
+    def hold_scene(self) -> None:
+        """Count the packed scene of a render that has not begun, once. Raises TooLarge, Unavailable."""
+        if self._budget is not None:
+            self._budget.hold("scenes", self, self.scene_bytes)
+
     def read(self, size: int) -> None:
         """Count that parsing the document takes so many bytes. Raises TooLarge, Unavailable."""
         self.reading_bytes = size

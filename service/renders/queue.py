@@ -104,11 +104,16 @@ class RenderQueue:
         `uses`: the assets that it refers to. The caller releases one that is not `listed`. Raises TooManyRequests
         where its owner has as many under way as one may have, Unavailable where the queue or the disk is full.
         """
-        self.admit(job.owner)
+        try:
+            self.admit(job.owner)
+            if listed and self.store is not None:
+                job.number = await self._stored(job, uses, key)
+        except BaseException:
+            job.release()
+            raise
         if listed and self.store is not None:
-            job.number = await self._stored(job, uses, key)
             job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
-            job.scene.document = job.scene.patch = None
+            job.scene.forget_document()
         if listed:
             self._number = job.number = max(job.number, self._number + 1)
             self._know(job)

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from service.ipc.messages import Update
 from service.pack import Packed
-from service.problems import TooLarge
+from service.problems import TooLarge, Unavailable
 from service.quality import ResolvedSettings
 from service.renders.memory import RenderMemory
 from service.requests.request_reader import stop_rule
@@ -76,9 +76,23 @@ class RenderScene:
         self._settings, self._load = settings, load
         self._packed = packed
         self._waiting = waiting
+        self._budget = budget
+        size = sum(len(each) for each in (document, patch) if each is not None)
+        if budget is not None and size:
+            budget.count("documents", self, size)  # the values that it was made from are more, and count until here
         if packed is not None:
             self.memory.packed(packed)
             self.memory.check()
+            try:
+                self.memory.hold_scene()
+            except Unavailable:
+                self._packed = None
+
+    def forget_document(self) -> None:
+        """The store has it, or the render is given up."""
+        self.document = self.patch = None
+        if self._budget is not None:
+            self._budget.release(self)
 
     def set_aside(self) -> None:
         """It waits: without room for the packed scene it waits as a document, and is packed again at its turn."""
@@ -86,6 +100,12 @@ class RenderScene:
             self._waiting is None or not self._waiting.keep(self, self.memory.scene_bytes)
         ):
             self._packed = None
+        self.memory.release()
+
+    def wait_as_document(self) -> None:
+        """It is not even in line yet."""
+        self._packed = None
+        self.memory.release()
 
     def forget(self) -> None:
         """Forget the packed scene. For any thread."""

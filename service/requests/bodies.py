@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
@@ -15,12 +15,12 @@ from service.requests.parser_pool import ParserPool
 from service.requests.parsers import PARSERS, Kind
 from service.scene.text import most_bytes
 from service.system.executors import parsing, waiting_for_parsers
-from service.system.memory import Limit, MemoryBudget
+from service.system.memory import Holder, Limit, MemoryBudget
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
-# Bytes that are parsed in some ms: sending them to another process would take as long. Nor are so few counted: one
-# such body for each connection takes less than two of the largest bodies.
+# Bytes that are parsed in some ms: sending them to another process would take as long. The text of such a body is not
+# counted: one for each connection takes less than two of the largest. Its values are, but never refused.
 SMALL = 64 * 1024
 AT_ONCE = 4  # as many of the largest bodies may wait, two of one caller
 
@@ -31,28 +31,58 @@ class Bodies:
     def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
         self._config = config
         self._memory = memory or MemoryBudget(config.memory)
-        self._pool = ParserPool(config, self._memory)
+        self._pool = ParserPool(config)
         self._limit = Limit("bodies", AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")
 
-    async def parsed(self, kind: Kind, body: bytearray, caller: str = "", counted: bool = False) -> Any:
+    @asynccontextmanager
+    async def read(
+        self,
+        request: Request,
+        kind: Kind,
+        caller: str = "",
+        ready: Callable[[bytearray], Awaitable[None]] | None = None,
+    ) -> AsyncIterator[Any]:
+        """A context with the result of PARSERS[kind] for a request's body, in which the bytes that its values take at
+        most count: it lasts until they are packed, written or stored. The text counts until it is parsed.
+
+        `ready` is awaited with the whole text, before it is parsed. Raises what that and the parser raise, and
+        UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
+        """
+        values = Holder()
+        try:
+            async with self._taken(request) as body:
+                if ready is not None:
+                    await ready(body)
+                if len(body) <= SMALL:
+                    self._memory.count("bodies", values, most_bytes(body))
+                parsed = await self.parsed(kind, body, caller, partial(self._memory.hold, "bodies", values))
+                del body
+            yield parsed
+        finally:
+            self._memory.release(values)
+
+    async def parsed(
+        self, kind: Kind, body: bytearray, caller: str = "", hold: Callable[[int], None] | None = None
+    ) -> Any:
         """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
 
-        Turns go round the callers. `counted`: the bytes of `memory_for` count already.
+        Turns go round the callers. Before a large one is parsed, `hold` is called with the bytes of `memory_for`;
+        without it they count already.
         """
         if len(body) <= SMALL:
             return await parsing(partial(PARSERS[kind], self._config, body), caller)
-        return await waiting_for_parsers(partial(self._pool.parse, kind, body, counted), caller)
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body, hold), caller)
 
     @staticmethod
     def memory_for(body: bytearray) -> int:
-        """The bytes of memory that parsing a body takes at most; 0 for small ones, which are not counted."""
+        """The bytes of memory that parsing a body takes at most; 0 for small ones, which never wait for memory."""
         return most_bytes(body) if len(body) > SMALL else 0
 
     def close(self) -> None:
         self._pool.close()
 
     @asynccontextmanager
-    async def taken(self, request: Request) -> AsyncIterator[bytearray]:
+    async def _taken(self, request: Request) -> AsyncIterator[bytearray]:
         """The body, whose bytes count within the context, as those of the caller of the work at hand.
 
         Raises UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.

@@ -9,8 +9,8 @@ import pickle
 import signal
 import threading
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -23,7 +23,6 @@ from service.scene import MeshShape, Scene
 from service.scene.text import most_bytes
 from service.system.child_processes import Child, Children, Closed
 from service.system.garbage import collector_paused
-from service.system.memory import MemoryBudget
 from service.system.turns import CALLER
 
 BODIES = 1000  # for one child
@@ -44,16 +43,16 @@ class ParserFailed(Exception):
 class ParserPool:
     """Processes that parse, started on demand: one for each thread that calls `parse` at the same time."""
 
-    def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
+    def __init__(self, config: Config) -> None:
         self._config = config.model_copy(update={"api_key": [], "callback_secret": []})  # not for strangers' texts
         self._children = Children("service.requests.parser_child", BODIES)
-        self._memory = memory or MemoryBudget(config.memory)
         self._room = _Room(config.max_json_memory)
 
-    def parse(self, kind: Kind, body: bytearray, counted: bool = False) -> Any:
+    def parse(self, kind: Kind, body: bytearray, hold: Callable[[int], None] | None = None) -> Any:
         """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time.
 
-        `counted`: the memory that this takes counts already."""
+        `hold` is called with the bytes that this takes at most, before they are taken, to count them for as long as
+        there is the result; without it they count already."""
         needed, most = most_bytes(body), self._config.max_json_memory
         if needed > most:
             detail = f"What this body holds may take {needed // MIB} MiB of memory: no more than {most // MIB} MiB"
@@ -61,12 +60,11 @@ class ParserPool:
         seconds = self._config.parse_seconds + SECONDS_PER_BYTE * len(body)
         work = Work(kind, pickle.PickleBuffer(body), self._config, needed, seconds)
         try:
-            with (
-                self._room.taken(needed),
-                nullcontext() if counted else self._memory.held("bodies", needed),
-                self._children.one() as child,
-            ):
-                answer = _ask(child, work)
+            with self._room.taken(needed):
+                if hold is not None:
+                    hold(needed)
+                with self._children.one() as child:
+                    answer = _ask(child, work)
         except Closed:
             raise Unavailable("The server is shutting down.") from None
         if isinstance(answer, ServiceError):

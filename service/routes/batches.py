@@ -86,30 +86,26 @@ class AnimationQuery(Shown):
 async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> Response:
     state, owner = app_state(request), owner_of(request)
     idempotency.check_key(state, idempotency_key)
-    parsed = await _parsed(request, idempotency_key)
 
-    async def make(key: IdempotencyKey | None) -> Batch:
-        posed = await storing(partial(with_poses, parsed, state.storage, owner), caller_of(request))
-        return await _started(state, owner, posed, key)
+    async def ready(body: bytearray) -> None:
+        if len(body) > MOST_BYTES:
+            raise TooLarge(f"The body of a batch holds at most {MOST_BYTES // MIB} MiB: upload geometry as assets.")
+        if await idempotency.is_new(owner, idempotency_key, state.batches.keyed):
+            state.batches.admit(owner)
+        await state.renderers.able(STARTING_S)
 
-    keyed = state.batches.keyed
-    found = await idempotency.once(state, "batch", owner, idempotency_key, parsed.digest, keyed, make)
+    parsed: ParsedBatch
+    async with state.bodies.read(request, "batch", caller_of(request), ready) as parsed:
+
+        async def make(key: IdempotencyKey | None) -> Batch:
+            posed = await storing(partial(with_poses, parsed, state.storage, owner), caller_of(request))
+            return await _started(state, owner, posed, key)
+
+        keyed = state.batches.keyed
+        found = await idempotency.once(state, "batch", owner, idempotency_key, parsed.digest, keyed, make)
     batch = state.batches.get(found, owner) if isinstance(found, str) else found
     document = {"id": batch.id, "renders": batch.order.renders}
     return JSONResponse(document, 202, {"location": f"batches/{batch.id}"})
-
-
-async def _parsed(request: Request, key: str | None) -> ParsedBatch:
-    state, owner = app_state(request), owner_of(request)
-    async with state.bodies.taken(request) as body:
-        if len(body) > MOST_BYTES:
-            detail = f"The body of a batch holds at most {MOST_BYTES // MIB} MiB: upload geometry as assets."
-            raise TooLarge(detail)
-        if await idempotency.is_new(owner, key, state.batches.keyed):
-            state.batches.admit(owner)
-        await state.renderers.able(STARTING_S)
-        parsed: ParsedBatch = await state.bodies.parsed("batch", body, caller_of(request))
-    return parsed
 
 
 async def _started(state: AppState, owner: str, parsed: ParsedBatch, key: IdempotencyKey | None) -> Batch:

@@ -73,20 +73,21 @@ async def terms(request: Request) -> Response:
 
 
 async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
-    state = app_state(request)
-    async with state.bodies.taken(request) as body:
+    state, caller, owner = app_state(request), caller_of(request), owner_of(request)
+
+    async def ready(body: bytearray) -> None:
         await state.renderers.able(STARTING_S)
-        asked: BsdfRequest = await state.bodies.parsed(kind, body, caller_of(request))
-    owner = owner_of(request)
-    if getattr(asked.material, "asset", None) is None:
-        material: SceneData = pack_material(asked.material)
-    else:  # a file has to be read
-        reader = state.reader
-        material = await packing(lambda: reader.pack_material(asked.material, owner=owner))
-    question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner)
-    answer = asyncio.ensure_future(state.bsdf.ask(question, caller_of(request)))
-    if not await until(request, answer):
-        return Response(status_code=GONE)
+
+    asked: BsdfRequest
+    async with state.bodies.read(request, kind, caller, ready) as asked:
+        if getattr(asked.material, "asset", None) is None:
+            material: SceneData = pack_material(asked.material)
+        else:  # a file has to be read
+            material = await packing(partial(state.reader.pack_material, asked.material, owner=owner))
+        question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner)
+        answer = asyncio.ensure_future(state.bsdf.ask(question, caller))
+        if not await until(request, answer):
+            return Response(status_code=GONE)
     arrays = answer.result()
     few = sum(array.size for array in arrays.values()) <= AT_ONCE
     return Response(write(arrays) if few else await packing(partial(write, arrays)), media_type="application/json")

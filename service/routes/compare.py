@@ -68,21 +68,17 @@ class CompareQuery(BaseModel):
     responses=VERDICT | answers.problems(400, 404, 409, 410, 413, 415, 422, 429, 503),
 )
 async def compare(request: Request, query: Annotated[CompareQuery, Query()]) -> Response:
-    state = app_state(request)
-    asked = await _parsed(request)
-    answered = asyncio.ensure_future(_answered(state, asked, caller_of(request), owner_of(request), query))
-    if not await waiting.until(request, answered):
-        return Response(status_code=GONE)
-    return answered.result()
+    state, caller, owner = app_state(request), caller_of(request), owner_of(request)
 
-
-async def _parsed(request: Request) -> ParsedComparison:
-    state = app_state(request)
-    async with state.bodies.taken(request) as body:
-        state.render_queue.admit(owner_of(request))
+    async def ready(body: bytearray) -> None:
+        state.render_queue.admit(owner)
         await state.renderers.able(STARTING_S)
-        parsed: ParsedComparison = await state.bodies.parsed("comparison", body, caller_of(request))
-    return parsed
+
+    async with state.bodies.read(request, "comparison", caller, ready) as asked:
+        answered = asyncio.ensure_future(_answered(state, asked, caller, owner, query))
+        if not await waiting.until(request, answered):
+            return Response(status_code=GONE)
+        return answered.result()
 
 
 async def _answered(

@@ -144,16 +144,15 @@ async def put(
     if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
     state = app_state(request)
-    async with state.bodies.taken(request) as body:
-        checked: CheckedDocument = await state.bodies.parsed(check_kind(kind), body, caller_of(request))
     condition = Condition(_tags(if_match), _tags(if_none_match))
     wanted = BY_LINK if by_link else shared
 
-    def save() -> tuple[str, bool, str]:
+    def save(checked: CheckedDocument) -> tuple[str, bool, str]:
         kept, new = state.storage.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
         return kept, new, etag(checked.body.encode())
 
-    kept, new, response.headers["etag"] = await saving(save, caller_of(request))
+    async with state.bodies.read(request, check_kind(kind), caller_of(request)) as checked:
+        kept, new, response.headers["etag"] = await saving(partial(save, checked), caller_of(request))
     if new:
         response.status_code = 201
     return answers.Named(name=name, title=kept)

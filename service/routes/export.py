@@ -36,7 +36,7 @@ BODY = answers.body(
 )
 async def export(request: Request) -> Response:
     state = app_state(request)
-    async with state.bodies.taken(request) as body:
-        asked: ParsedExport = await state.bodies.parsed("export", body, caller_of(request))
-    format = scene_format(asked.format)
-    return await exporting.written(request, asked.scene, format, format.scene_writer, "/scene")
+    asked: ParsedExport
+    async with state.bodies.read(request, "export", caller_of(request)) as asked:
+        format = scene_format(asked.format)
+        return await exporting.written(request, asked.scene, format, format.scene_writer, "/scene")

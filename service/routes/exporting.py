@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import BinaryIO
 
@@ -43,34 +44,37 @@ async def written(
     Raises InvalidDocument, TooLarge, TooManyRequests, Unavailable.
     """
     state, caller = app_state(request), caller_of(request)
-    exported = await packing(partial(_export, state, scene, writer, owner_of(request), root), caller)
     media_type, ending = format.media_type, format.ending
-    if exported.beside:
-        exported = await packing(partial(exported.zipped, f"scene.{ending}"), caller)
-        media_type, ending = ZIP, "zip"
+    with state.memory.growing("scenes") as hold:  # until the pieces of the file are on the disk
+        exported = await packing(partial(_export, state, scene, writer, owner_of(request), root, hold), caller)
+        if exported.beside:
+            exported = await packing(partial(exported.zipped, f"scene.{ending}"), caller)
+            media_type, ending = ZIP, "zip"
+
+        def fill(file: BinaryIO) -> None:
+            for piece in exported.pieces:
+                file.write(piece)
+
+        state.downloads.admit(caller, exported.size)
+        file = await packing(partial(state.downloads.write, fill), caller)
+    state.downloads.keep(caller, None, file)
     headers = {
         "content-disposition": f'attachment; filename="scene.{ending}"',
         "sunbox-lost": exported.losses.header(root, within),
         "cache-control": "no-store",
     }
-
-    def fill(file: BinaryIO) -> None:
-        for piece in exported.pieces:
-            file.write(piece)
-
-    state.downloads.admit(caller, exported.size)
-    file = await packing(partial(state.downloads.write, fill), caller)
-    state.downloads.keep(caller, None, file)
     return FileAnswer(file.file, media_type, headers, file)
 
 
-def _export(state: AppState, scene: Scene, writer: Writer, owner: str, root: str) -> Exported:
+def _export(
+    state: AppState, scene: Scene, writer: Writer, owner: str, root: str, hold: Callable[[int], None]
+) -> Exported:
     files = state.storage.access.files(owner, scene)
     meshes = [shape for shape in scene.shapes if isinstance(shape, MeshShape)]
     size = sum(map(files.size, set(references(scene))))
     size += sum(rows.nbytes for each in meshes for rows in (each.vertices, each.faces) if rows is not None)
+    hold(TIMES * size)
     try:
-        with state.memory.held("scenes", TIMES * size):
-            return writer(scene, files, state.config)
+        return writer(scene, files, state.config)
     except InvalidDocument as error:
         raise error.under(root) from None

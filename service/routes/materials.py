@@ -22,6 +22,6 @@ router = APIRouter(prefix="/v1/materials", tags=["materials"])
 )
 async def convert(request: Request) -> answers.ConvertedMaterial:
     bodies = app_state(request).bodies
-    async with bodies.taken(request) as body:
-        found: Converted = await bodies.parsed("conversion", body, caller_of(request))
-    return answers.ConvertedMaterial(material=found.material, lost=found.lost)
+    found: Converted
+    async with bodies.read(request, "conversion", caller_of(request)) as found:
+        return answers.ConvertedMaterial(material=found.material, lost=found.lost)

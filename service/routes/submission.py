@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import AsyncIterator, Collection, Sequence
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ from service.quality import ResolvedSettings
 from service.renders.job import Job
 from service.renders.status import status
 from service.renders.store.record import IdempotencyKey, Order, StoredRender
+from service.requests.parsers import Kind
 from service.requests.request_parser import ParsedRequest
 from service.routes import idempotency
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
@@ -31,9 +32,9 @@ ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an optio
 async def one_shot(request: Request) -> Job:
     """A queued render that is not listed."""
     began, state = time.monotonic(), app_state(request)
-    parsed = await _parsed(request, "request")
-    job = await _packed(state, parsed, owner_of(request), began)
-    await state.render_queue.submit(job, listed=False)
+    async with _parsed(request, "request") as parsed:
+        job = await _packed(state, parsed, owner_of(request), began)
+        await state.render_queue.submit(job, listed=False)
     return job
 
 
@@ -49,13 +50,13 @@ async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     """A queued render, or the earlier one with this idempotency key: its status where it is gone."""
     began, state, owner = time.monotonic(), app_state(request), owner_of(request)
     idempotency.check_key(state, key)
-    parsed = await _parsed(request, "render" if key is None else "keyed_render", key)
+    async with _parsed(request, "render" if key is None else "keyed_render", key) as parsed:
 
-    async def make(taken: IdempotencyKey | None) -> Job:
-        return await _submitted(state, parsed, owner, began, taken)
+        async def make(taken: IdempotencyKey | None) -> Job:
+            return await _submitted(state, parsed, owner, began, taken)
 
-    found = await idempotency.once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
-    return _known(state, found, parsed) if isinstance(found, StoredRender) else found
+        found = await idempotency.once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
+        return _known(state, found, parsed) if isinstance(found, StoredRender) else found
 
 
 async def _keyed(state: AppState, owner: str, key: str) -> tuple[str, StoredRender] | None:
@@ -63,14 +64,15 @@ async def _keyed(state: AppState, owner: str, key: str) -> tuple[str, StoredRend
     return None if store is None else await store.keyed(owner, key)
 
 
-async def _parsed(request: Request, kind: Any, key: str | None = None) -> ParsedRequest:
+def _parsed(request: Request, kind: Kind, key: str | None = None) -> AbstractAsyncContextManager[ParsedRequest]:
     state, owner = app_state(request), owner_of(request)
-    async with state.bodies.taken(request) as body:
+
+    async def ready(body: bytearray) -> None:
         if await idempotency.is_new(owner, key, partial(_keyed, state)):
             state.render_queue.admit(owner)
         await state.renderers.able(STARTING_S)
-        parsed: ParsedRequest = await state.bodies.parsed(kind, body, caller_of(request))
-    return parsed
+
+    return state.bodies.read(request, kind, caller_of(request), ready)
 
 
 async def _submitted(

@@ -92,6 +92,11 @@ class MemoryBudget:
         if over > 0:
             raise Unavailable("There is no memory for this just now (SUNBOX_MEMORY).", RETRY_S)
 
+    def count(self, category: Category, holder: object, size: int) -> None:
+        """As `hold`, but never refused: for what is small, or in the place of what counted before and is larger."""
+        with self._lock:
+            self._accounts.setdefault(holder, _Account()).sizes[category] = size
+
     def lacks(self, size: int) -> int:
         """The bytes that are missing for `size` more, once caches have given way; 0 where there is room."""
         if (over := self._over(size)) > 0:

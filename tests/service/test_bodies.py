@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,13 @@ import pytest
 
 from service.app import create_app
 from service.config import Config
+from service.problems import Unavailable
+from service.renders.job import Job
 from service.requests.bodies import SMALL
 from service.routes.submission import pinned
+from service.scene.text import most_bytes
 from service.state import AppState
-from service.system.executors import storing
+from service.system.executors import Pool, packing, saving, storing
 
 MIB = 1 << 20
 GREY = b'{"type": "diffuse", "albedo": 0.5}'
@@ -151,3 +154,60 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
         await asyncio.gather(*large)
 
     calling(tmp_path, test)
+
+
+# Calls whose values wait for nothing: they are answered as soon as the body is parsed.
+AT_ONCE = {"/v1/materials/convert"}
+
+
+@pytest.mark.parametrize("blanks", [0, 2 * SMALL])
+def test_a_body_s_values_count_until_they_are_packed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blanks: int
+) -> None:
+    """By every call that takes JSON: while they wait for a thread, for the disk and for a renderer."""
+
+    async def test(app: Any) -> None:
+        state: AppState = app.state.sunbox
+        seen = list[int]()
+
+        async def able(seconds: float) -> None: ...
+
+        async def waits(*args: Any, **values: Any) -> Any:
+            seen.append(state.memory.used()["bodies"])
+            for job in args:
+                if isinstance(job, Job):
+                    assert state.memory.used()["scenes"] > 0, "what was packed counts, too"
+                    job.release()  # as the queue does with one that it refuses
+            raise Unavailable("It has been waiting.")
+
+        async def work(pool: Pool, *args: Any) -> Any:
+            if pool in (packing, storing, saving):
+                seen.append(state.memory.used()["bodies"])
+            return await run(pool, *args)
+
+        run = Pool.__call__
+        monkeypatch.setattr(Pool, "__call__", work)
+        monkeypatch.setattr(state.renderers, "able", able)
+        for waiting, name in ((state.render_queue, "submit"), (state.batches, "submit"), (state.bsdf, "ask")):
+            monkeypatch.setattr(waiting, name, waits)
+        for path, method, name, example in _examples(app.openapi()):
+            seen.clear()
+            address = path.replace("{kind}", f"{name}s").replace("{name}", "example")
+            body = json.dumps(example).encode().ljust(blanks)
+            call = Call(app, "a", method.upper(), address, body)
+            assert await call.answered() in (200, 201, 503), (path, call.body)
+            assert len(seen) > 0 or path in AT_ONCE, path
+            assert all(counted >= most_bytes(body) for counted in seen), (path, seen, most_bytes(body))
+            assert state.memory.used()["bodies"] == state.memory.used()["documents"] == 0, path
+
+    calling(tmp_path, test)
+
+
+def _examples(description: Any) -> Iterator[tuple[str, str, str, Any]]:
+    """Each call that takes JSON, with its method, and an example's name and value."""
+    for path, methods in description["paths"].items():
+        for method, call in methods.items():
+            if (content := call.get("requestBody", {}).get("content", {}).get("application/json")) is not None:
+                assert content["examples"], path
+                for name, example in content["examples"].items():
+                    yield path, method, name, example["value"]

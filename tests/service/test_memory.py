@@ -26,6 +26,7 @@ from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, CacheBudget, P
 from service.problems import TooLarge, TooManyRequests, Unavailable
 from service.requests.bodies import Bodies
 from service.requests.request_reader import RequestReader
+from service.scene.text import most_bytes
 from service.streams import protocol
 from service.streams.edit_session import EditSession
 from service.system import memory
@@ -231,15 +232,21 @@ def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     budget = MemoryBudget(4 * MIB)
     bodies = Bodies(Config(), budget)
 
+    text = b'{"material": {"type": "diffuse"}, "to": "openpbr"}'.ljust(2 * MIB)
+
     async def receive() -> dict[str, Any]:
-        return {"type": "http.request", "body": bytes(2 * MIB), "more_body": False}
+        return {"type": "http.request", "body": text, "more_body": False}
 
     async def take(inner: bool) -> None:
-        request = Request({"type": "http", "method": "POST", "headers": []}, receive)
-        async with bodies.taken(request):
+        async def ready(body: bytearray) -> None:
             assert budget.used()["bodies"] >= 2 * MIB
             if inner:
                 await take(False)
+
+        request = Request({"type": "http", "method": "POST", "headers": []}, receive)
+        async with bodies.read(request, "conversion", "", ready) as converted:
+            assert converted.material["type"] == "openpbr"
+            assert budget.used()["bodies"] >= most_bytes(text)
 
     asyncio.run(take(True))
     assert budget.used()["bodies"] == 0
