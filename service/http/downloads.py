@@ -12,8 +12,8 @@ import os
 import tempfile
 import weakref
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Callable, Hashable, Mapping
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Hashable, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO
@@ -150,6 +150,12 @@ class Downloads:
         A picture of more than a quarter of the room counts as a quarter, so that pictures of any size can be sent.
         """
         self._shares.check(caller, min(most_bytes, ROOM // 4))
+
+    @contextmanager
+    def making(self, caller: str, most_bytes: int) -> Iterator[None]:
+        """A context in which `most_bytes` count, as `admit` has them: what takes long to make counts meanwhile."""
+        with self._shares.taken(caller, min(most_bytes, ROOM // 4)):
+            yield
 
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
         """A file that `fill` has written. For any thread. Raises Unavailable where the disk is full."""

@@ -1,16 +1,22 @@
 """Pictures one after the other: APNG, WebP, GIF and AVIF by Pillow, MP4 by the system's ffmpeg.
 
+Whatever their number, one picture is in memory at a time, and compressed ones. Pillow writes WebP and AVIF so from an
+image that has all pictures as its frames. For APNG and GIF it would collect all of them; there each picture is
+compressed by Pillow as a file of its own, whose parts are put into the animation's.
+
 No wheel with an encoder for MP4 is a dependency: those that there are hold code under the GPL.
 """
 
 from __future__ import annotations
 
+import io
 import shutil
+import struct
 import subprocess
-from collections.abc import Iterable, Iterator
-from itertools import chain
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, BinaryIO, Literal, get_args
 
 from PIL import Image
 
@@ -24,12 +30,12 @@ MIME: dict[AnimationFormat, str] = {
     "mp4": "video/mp4",
 }
 QUALITY = 90
-_PILLOW: dict[AnimationFormat, tuple[str, dict[str, Any]]] = {
-    "apng": ("PNG", {"compress_level": 6}),
-    "webp": ("WEBP", {"quality": QUALITY, "method": 4, "minimize_size": False}),
-    "gif": ("GIF", {"optimize": False, "disposal": 1}),
-    "avif": ("AVIF", {"quality": QUALITY, "speed": 8}),
+_OPTIONS: dict[AnimationFormat, dict[str, Any]] = {
+    "webp": {"quality": QUALITY, "method": 4, "minimize_size": False},
+    "avif": {"quality": QUALITY, "speed": 8},
 }
+PNG_HEAD, GIF_HEAD = 8, 13  # bytes before the first chunk; before the table of colours
+FOR_EVER = b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"  # GIF's extension that repeats it
 
 
 class NoEncoder(Exception):
@@ -46,32 +52,116 @@ def encoder() -> str:
     return found
 
 
-def write(path: Path, frames: Iterable[Image.Image], format: AnimationFormat, fps: float) -> None:
-    """Write frames of one size, RGB, which repeat for ever (MP4: as the player likes). Raises NoEncoder, OSError."""
+class Frames(Image.Image):
+    """Pictures of one size, RGB, one after the other in a file without a head; one of them is in memory."""
+
+    def __init__(self, path: Path, size: tuple[int, int]) -> None:
+        super().__init__()
+        self._file = path.open("rb")
+        self._bytes = 3 * size[0] * size[1]
+        self._at = -1
+        self.n_frames = path.stat().st_size // self._bytes
+        self.is_animated = self.n_frames > 1
+        self.im = Image.new("RGB", size).im
+        self._mode, self._size = "RGB", size
+        self.seek(0)
+
+    def seek(self, frame: int) -> None:
+        """Raises EOFError behind the last one, as Pillow's images do."""
+        if frame >= self.n_frames:
+            raise EOFError
+        if frame != self._at:
+            self._file.seek(frame * self._bytes)
+            self.frombytes(self._file.read(self._bytes))
+            self._at = frame
+
+    def tell(self) -> int:
+        return self._at
+
+    def __iter__(self) -> Iterator[Image.Image]:
+        for frame in range(self.n_frames):
+            self.seek(frame)
+            yield self
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def write(path: Path, frames: Frames, format: AnimationFormat, fps: float) -> None:
+    """Write frames that repeat for ever (MP4: as the player likes). Raises NoEncoder, OSError."""
     if format == "mp4":
-        return _write_mp4(path, iter(frames), fps)
-    name, options = _PILLOW[format]
-    rest = iter(frames)
-    first = next(rest)
-    others = list(rest) if format == "apng" else rest  # Pillow goes through these twice
-    shown_ms = 1000.0 / fps
-    duration = (
-        max(round(shown_ms / 10) * 10, 20) if format == "gif" else round(shown_ms)
-    )  # browsers slow down shorter ones
-    first.save(path, name, save_all=True, append_images=others, duration=duration, loop=0, **options)
-    return None
+        _write_mp4(path, frames, fps)
+    elif format in _OPTIONS:
+        options = _OPTIONS[format]
+        frames.save(path, format, save_all=True, duration=round(1000 / fps), loop=0, **options)
+    else:
+        with path.open("wb") as file:
+            (_write_apng if format == "apng" else _write_gif)(file, frames, fps)
 
 
-def _write_mp4(path: Path, frames: Iterator[Image.Image], fps: float) -> None:
+def _write_apng(file: BinaryIO, frames: Frames, fps: float) -> None:
+    """A PNG file with more pictures in chunks of their own [PNG 3rd edition, 2025, 11.3.6]."""
+    number = 0  # of the next chunk that is counted
+    for at, frame in enumerate(frames):
+        chunks = list(_png_chunks(_alone(frame, "PNG", compress_level=6)))
+        if at == 0:
+            file.write(b"\x89PNG\r\n\x1a\n" + _chunk(*chunks[0]))
+            file.write(_chunk(b"acTL", struct.pack(">II", frames.n_frames, 0)))
+        shown = struct.pack(">IIIIIHHBB", number, *frames.size, 0, 0, round(1000 / fps), 1000, 0, 0)
+        file.write(_chunk(b"fcTL", shown))
+        number += 1
+        for kind, data in chunks:
+            if kind == b"IDAT" and at == 0:
+                file.write(_chunk(kind, data))
+            elif kind == b"IDAT":
+                file.write(_chunk(b"fdAT", struct.pack(">I", number) + data))
+                number += 1
+    file.write(_chunk(b"IEND", b""))
+
+
+def _png_chunks(png: bytes) -> Iterator[tuple[bytes, bytes]]:
+    at = PNG_HEAD
+    while at < len(png):
+        size, kind = struct.unpack_from(">I4s", png, at)
+        yield kind, png[at + 8 : at + 8 + size]
+        at += 12 + size
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def _write_gif(file: BinaryIO, frames: Frames, fps: float) -> None:
+    """Each picture has a table of colours of its own [GIF89a, 1990, 20 and 23]."""
+    shown = max(round(100 / fps), 2)  # hundredths of a second: browsers slow down shorter ones
+    for at, frame in enumerate(frames):
+        gif = _alone(frame, "GIF", optimize=False, interlace=0)
+        table = 3 << ((gif[10] & 7) + 1)  # bytes of its colours
+        image = gif.index(b"\x2c", GIF_HEAD + table)  # its descriptor; no extension is before it
+        if at == 0:
+            file.write(b"GIF89a" + gif[6:10] + b"\x70\x00\x00" + FOR_EVER)
+        file.write(struct.pack("<4sHxx", b"\x21\xf9\x04\x04", shown))
+        file.write(gif[image : image + 9] + bytes([0x80 | gif[10] & 7]) + gif[GIF_HEAD : GIF_HEAD + table])
+        file.write(gif[image + 10 : -1])
+    file.write(b"\x3b")
+
+
+def _alone(frame: Image.Image, format: str, **options: Any) -> bytes:
+    """A file with this picture alone."""
+    with io.BytesIO() as file:
+        frame.save(file, format, **options)
+        return file.getvalue()
+
+
+def _write_mp4(path: Path, frames: Frames, fps: float) -> None:
     """H.264 with 4:2:0, which every browser plays; an odd width or height gets a black line more."""
-    first = next(frames)
     source = [
         "-f",
         "rawvideo",
         "-pix_fmt",
         "rgb24",
         "-s",
-        f"{first.width}x{first.height}",
+        f"{frames.width}x{frames.height}",
         "-r",
         f"{fps:g}",
         "-i",
@@ -92,10 +182,11 @@ def _write_mp4(path: Path, frames: Iterator[Image.Image], fps: float) -> None:
         "mp4",
         str(path),
     ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    # The file may be a descriptor's, which ffmpeg needs, too.
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, close_fds=False) as process:
         assert process.stdin is not None and process.stderr is not None
         try:
-            for frame in chain([first], frames):
+            for frame in frames:
                 process.stdin.write(frame.tobytes())
             process.stdin.close()
         except BrokenPipeError:

@@ -7,7 +7,8 @@ import re
 import tempfile
 import time
 import zipfile
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
@@ -22,19 +23,24 @@ from service.batches.batch import Batch
 from service.http.downloads import FileAnswer, Written
 from service.images import animation, over_black
 from service.images.animation import MIME, AnimationFormat
+from service.images.animator import Animator, most_memory
 from service.images.contact_sheet import ContactSheet
 from service.ipc.messages import View
 from service.problems import Conflict, Gone, NotProvided, TooLarge
 from service.renders.job import Job
 from service.renders.store.store import MAKING
 from service.requests.batch_request import variations_of
+from service.routes import waiting
+from service.routes.errors import GONE
 from service.routes.renders import ImageQuery, picture_file
 from service.state import app_state, caller_of
-from service.system.executors import writing
+from service.system.disk_usage import Usage
+from service.system.executors import filming, writing
 
 SheetFormat = Literal["png", "jpeg", "webp"]
 SHEET_FORMATS: tuple[SheetFormat, ...] = get_args(SheetFormat)
 FRAMES = 64  # times SUNBOX_MAX_PIXELS: pixels of an animation
+SHEET_PIXEL_BYTES = 6  # of a sheet while it is drawn and written: the drawing, and a copy of it
 LONGEST_NAME = 80  # characters in the name of a zipped file
 
 
@@ -112,7 +118,9 @@ async def sheet(
         )
         raise TooLarge(detail + "a smaller width.")
 
-    async def fill(folder: Path) -> Callable[[BinaryIO], None]:
+    state = app_state(request)
+
+    async def make(folder: Path) -> Written:
         pictures = _Spooled(folder / "pictures", cell)
         await pictures.fill(batch, steps, view)
         places = {step: i for i, step in enumerate(steps)}
@@ -124,11 +132,11 @@ async def sheet(
             drawn = layout.drawn(picture, batch.state_of)
             images.write(file, np.asarray(drawn), format)
 
-        return write
+        with state.memory.held("pictures", SHEET_PIXEL_BYTES * pixels):
+            return await writing(partial(state.downloads.write, write))
 
-    return await _made(
-        request, batch, ("sheet", format, width, view), steps, images.FORMATS[format].mime, 3 * pixels, fill
-    )
+    made = _Made(("sheet", format, width, view), steps, cell, images.FORMATS[format].mime, 3 * pixels)
+    return await _answered(request, batch, made, make)
 
 
 async def animated(
@@ -153,37 +161,64 @@ async def animated(
         except animation.NoEncoder as error:
             raise NotProvided(str(error)) from None
 
-    async def fill(folder: Path) -> Callable[[BinaryIO], None]:
+    state = app_state(request)
+
+    async def make(folder: Path) -> Written:
         pictures = _Spooled(folder / "pictures", cell)
         await pictures.fill(batch, steps, view)
+        animator = Animator(pictures.path, cell, len(steps), format, fps)
+        with state.memory.held("pictures", most_memory(cell, len(steps))):
+            try:
+                return await filming(partial(state.downloads.write, animator.write))
+            finally:
+                animator.stop()
 
-        def write(file: BinaryIO) -> None:
-            made = folder / "animation"
-            animation.write(made, pictures, format, fps)
-            with made.open("rb") as source:
-                while piece := source.read(1 << 20):
-                    file.write(piece)
-
-        return write
-
-    return await _made(request, batch, ("animation", format, fps, width, view), steps, MIME[format], 3 * pixels, fill)
+    most_bytes = 3 * cell[0] * cell[1] * len(steps)
+    made = _Made(("animation", format, fps, width, view), steps, cell, MIME[format], most_bytes)
+    return await _answered(request, batch, made, make)
 
 
-async def _made(
-    request: Request, batch: Batch, what: tuple[object, ...], steps: list[int], mime: str, most_bytes: int,
-    fill: Callable[[Path], Awaitable[Callable[[BinaryIO], None]]],
-) -> Response:  # fmt: skip
-    """The answer, from a file that is made once for all who ask while no other render of the batch ends."""
-    state, caller, key = app_state(request), caller_of(request), (batch.id, *what, tuple(steps))
+@dataclass(frozen=True)
+class _Made:
+    """A file of a batch's pictures, which `what` tells from others of the same batch."""
+
+    what: tuple[object, ...]
+    steps: list[int]
+    cell: tuple[int, int]  # width and height of one picture
+    mime: str
+    most_bytes: int
+
+    @property
+    def disk(self) -> Usage:
+        """What is on the disk while it is made: the pictures, and the file."""
+        return Usage(3 * self.cell[0] * self.cell[1] * len(self.steps) + self.most_bytes, 2)
+
+
+async def _answered(
+    request: Request, batch: Batch, made: _Made, make: Callable[[Path], Awaitable[Written]]
+) -> Response:
+    """The answer, from a file that is made once for all who ask while no other render of the batch ends. Closing the
+    connection ends the work."""
+    making = asyncio.ensure_future(_written(request, batch, made, make))
+    if not await waiting.until(request, making):
+        return Response(status_code=GONE)
+    written = making.result()
+    return FileAnswer(written.file, made.mime, {"cache-control": "no-store"}, held=written)
+
+
+async def _written(
+    request: Request, batch: Batch, made: _Made, make: Callable[[Path], Awaitable[Written]]
+) -> Written:
+    state, caller = app_state(request), caller_of(request)
+    key = (batch.id, *made.what, tuple(made.steps))
     async with batch.making:
-        written = state.downloads.find(key)
-        if written is None:
-            state.downloads.admit(caller, most_bytes)
-            with tempfile.TemporaryDirectory(prefix=MAKING, dir=_folder(state.config.data_dir)) as folder:
-                write = await fill(Path(folder))
-                written = await writing(partial(state.downloads.write, write))
+        if (written := state.downloads.find(key)) is None:
+            with state.downloads.making(caller, made.most_bytes):
+                async with state.storage.quota.making(made.disk):
+                    with tempfile.TemporaryDirectory(prefix=MAKING, dir=_folder(state.config.data_dir)) as folder:
+                        written = await make(Path(folder))
             state.downloads.keep(caller, key, written, lasting=True)
-    return FileAnswer(written.file, mime, {"cache-control": "no-store"}, held=written)
+    return written
 
 
 def _folder(data: Path) -> Path | None:
@@ -196,10 +231,10 @@ def _folder(data: Path) -> Path | None:
 
 
 class _Spooled:
-    """Pictures of one size on the disk, which may be gone through more than once."""
+    """Pictures of one size on the disk, one after the other."""
 
     def __init__(self, path: Path, size: tuple[int, int]) -> None:
-        self._path, self._size, self._count = path, size, 0
+        self.path, self._size = path, size
 
     async def fill(self, batch: Batch, steps: Sequence[int], view: View) -> None:
         for step in steps:
@@ -210,18 +245,14 @@ class _Spooled:
         picture = Image.fromarray(over_black(pixels))
         if picture.size != self._size:
             picture = picture.resize(self._size, Image.Resampling.LANCZOS)
-        with self._path.open("ab") as file:
+        with self.path.open("ab") as file:
             file.write(picture.tobytes())
-        self._count += 1
 
     def at(self, index: int) -> Image.Image:
         size = 3 * self._size[0] * self._size[1]
-        with self._path.open("rb") as file:
+        with self.path.open("rb") as file:
             file.seek(index * size)
             return Image.frombytes("RGB", self._size, file.read(size))
-
-    def __iter__(self) -> Iterator[Image.Image]:
-        return map(self.at, range(self._count))
 
 
 def _scaled(batch: Batch, steps: Sequence[int], width: int | None) -> tuple[int, int]:

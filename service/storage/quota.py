@@ -5,19 +5,22 @@ Pictures of renders that the database does not know are deleted before them.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
+from contextlib import AbstractContextManager, asynccontextmanager, contextmanager
+from functools import partial
 from pathlib import Path
 
 from service.assets.folder import AssetFolder, total
 from service.problems import TooLarge, Unavailable
 from service.storage.lost_pictures import LostPictures
 from service.system.disk_usage import Usage
+from service.system.executors import opening
 
 log = logging.getLogger(__name__)
 
@@ -93,6 +96,19 @@ class Quota:
         finally:
             with self._lock:
                 self._pending -= size
+
+    @asynccontextmanager
+    async def making(self, size: Usage) -> AsyncIterator[None]:
+        """A context in which `size` more is on the disk for a while, as `room` has it, for the event loop."""
+        room = self.room(size)
+        entering = asyncio.ensure_future(opening(room.__enter__))
+        try:
+            await asyncio.shield(entering)
+            yield
+        finally:  # also where the caller was cancelled while a thread made room
+            await asyncio.wait({entering})
+            if entering.exception() is None:
+                await opening(partial(room.__exit__, None, None, None))
 
     @contextmanager
     def pinned(self, ids: Collection[str]) -> Iterator[None]:

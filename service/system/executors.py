@@ -97,6 +97,7 @@ opening = Pool("opening", 3, NICENESS)  # finds assets and keeps them from being
 saving = Pool("saving", 3)  # documents: the disk's time
 encoding = Pool("encoding", 3)  # frames to JPEG and the like: milliseconds, while a person watches
 writing = Pool("writing", 3, WRITING_NICENESS)  # pictures to files: seconds for the largest
+filming = Pool("filming", 2, WRITING_NICENESS)  # waits for processes that write animations: minutes
 comparing = Pool("comparing", 3, WRITING_NICENESS)  # pictures: seconds for the largest
 recording = Pool("recording", 1)  # the rows of renders, in order: the disk's time
 saving_pictures = Pool("pictures", 1)  # small ones of renders to the disk and back: milliseconds

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import threading
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,8 @@ import pytest
 from PIL import Image, ImageSequence
 
 from service.images import animation
-from service.images.animation import NoEncoder
+from service.images.animation import Frames, NoEncoder
+from service.images.animator import Animator
 from service.images.contact_sheet import EMPTY, PAPER, ContactSheet
 
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200), (200, 200, 30), (30, 200, 200), (200, 30, 200)]
@@ -19,6 +22,15 @@ COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200), (200, 200, 30), (30, 200
 
 def picture(k: int, size: tuple[int, int] = (64, 48)) -> Image.Image:
     return Image.new("RGB", size, COLOURS[k % len(COLOURS)])
+
+
+def frames_of(folder: Path, pictures: Iterable[Image.Image]) -> Frames:
+    spool = folder / "spool"
+    with spool.open("wb") as file:
+        for each in pictures:
+            file.write(each.tobytes())
+            size = each.size
+    return Frames(spool, size)
 
 
 def blocks(sheet: Image.Image, colour: tuple[int, int, int]) -> list[int]:
@@ -60,7 +72,7 @@ def test_larger_pictures_are_scaled_down_and_long_names_cut() -> None:
 @pytest.mark.parametrize("format", ["apng", "webp", "gif", "avif"])
 def test_animations_have_all_frames(tmp_path: Path, format: animation.AnimationFormat) -> None:
     path = tmp_path / "a"
-    animation.write(path, (picture(k) for k in range(5)), format, fps=20)
+    animation.write(path, frames_of(tmp_path, (picture(k) for k in range(5))), format, fps=20)
     with Image.open(path) as made:
         frames = [np.asarray(frame.convert("RGB")).mean(axis=(0, 1)) for frame in ImageSequence.Iterator(made)]
         assert made.size == (64, 48) and made.n_frames == 5
@@ -71,14 +83,14 @@ def test_animations_have_all_frames(tmp_path: Path, format: animation.AnimationF
 def test_single_picture_is_an_animation_too(tmp_path: Path, format: animation.AnimationFormat) -> None:
     if format == "mp4" and shutil.which("ffmpeg") is None:
         pytest.skip("no ffmpeg here")
-    animation.write(tmp_path / "a", [picture(0, (31, 17))], format, fps=1)
+    animation.write(tmp_path / "a", frames_of(tmp_path, [picture(0, (31, 17))]), format, fps=1)
     assert (tmp_path / "a").stat().st_size > 0
 
 
 def test_mp4_needs_ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(NoEncoder, match="ffmpeg"):
-        animation.write(tmp_path / "a", [picture(0)], "mp4", fps=1)
+        animation.write(tmp_path / "a", frames_of(tmp_path, [picture(0)]), "mp4", fps=1)
 
 
 def test_ffmpegs_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,13 +99,49 @@ def test_ffmpegs_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     program.chmod(0o755)
     monkeypatch.setattr(shutil, "which", lambda name: str(program))
     with pytest.raises(OSError, match="Unknown encoder"):
-        animation.write(tmp_path / "a", [picture(0)], "mp4", fps=1)
+        animation.write(tmp_path / "a", frames_of(tmp_path, [picture(0)]), "mp4", fps=1)
 
 
 def test_mp4_plays_at_its_rate(tmp_path: Path) -> None:
     if shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None:
         pytest.skip("no ffmpeg here")
-    animation.write(tmp_path / "a.mp4", (picture(k, (65, 49)) for k in range(6)), "mp4", fps=3)
+    animation.write(tmp_path / "a.mp4", frames_of(tmp_path, (picture(k, (65, 49)) for k in range(6))), "mp4", fps=3)
     probe = ["ffprobe", "-v", "error", "-show_entries", "stream=width,height,nb_frames,duration", "-of", "csv=p=0"]
     said = subprocess.run([*probe, str(tmp_path / "a.mp4")], capture_output=True, text=True).stdout
     assert said.strip() == "66,50,2.000000,6"
+
+
+@pytest.mark.parametrize("format", ["apng", "webp", "gif", "avif"])
+def test_one_frame_is_in_memory_at_a_time(
+    tmp_path: Path, format: animation.AnimationFormat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many there are."""
+    frames, live = frames_of(tmp_path, (picture(k) for k in range(40))), list[int]()
+    seek = Frames.seek
+
+    def counting(self: Frames, frame: int) -> None:
+        seek(self, frame)
+        blocks = Image.core.get_stats()  # type: ignore[attr-defined]
+        live.append(blocks["allocated_blocks"] - blocks["freed_blocks"] - blocks["blocks_cached"])
+
+    monkeypatch.setattr(Frames, "seek", counting)
+    animation.write(tmp_path / "a", frames, format, fps=20)
+    assert len(live) >= 40 and max(live[1:]) <= min(live[1:]) + 2
+
+
+def test_an_animation_ends_when_nobody_waits_for_it(tmp_path: Path) -> None:
+    frames = frames_of(tmp_path, (picture(k, (640, 480)) for k in range(200)))
+    animator = Animator(tmp_path / "spool", frames.size, 200, "gif", 20)
+    with (tmp_path / "a").open("wb") as file:
+        threading.Timer(0.5, animator.stop).start()
+        with pytest.raises(OSError, match=r"could not be written|nobody waits"):
+            animator.write(file)
+
+
+def test_an_animation_has_a_bound_of_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    size = frames_of(tmp_path, [picture(k, (1024, 1024)) for k in range(4)]).size
+    monkeypatch.setattr("service.images.animator.SLACK", 0)
+    monkeypatch.setattr("service.images.animator.most_memory", lambda size, pictures: 0)
+    animator = Animator(tmp_path / "spool", size, 4, "webp", 20)
+    with (tmp_path / "a").open("wb") as file, pytest.raises(OSError, match="could not be written"):
+        animator.write(file)
