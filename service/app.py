@@ -111,6 +111,7 @@ def create_app(config: Config) -> FastAPI:
         version=metadata.version("sunbox-server"),
         description="A progressive path-tracing render service: JSON scenes in, converging pictures out.",
         lifespan=_lifespan,
+        openapi_url=None,
         docs_url=None,
         redoc_url=None,
     )
@@ -132,9 +133,9 @@ def create_app(config: Config) -> FastAPI:
     for router in (each.router for each in api):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)
+    describe(app, keyed=bool(config.api_key))
     app.mount("/", Files(directory=WEB, html=True))
     tell_errors(app)
-    describe(app, keyed=bool(config.api_key))
     app.add_middleware(Compressed)
     app.add_middleware(Guard, config=config, refuse=respond)
     app.add_middleware(Pieces)

@@ -6,9 +6,8 @@ import json
 import time
 from typing import Any
 
-from service.batches.batch import Batch
-from service.renders.job import Job
 from service.renders.status import iso
+from service.storage.callback_rows import Kind
 
 OF_RENDERS = (
     "id", "state", "label", "created", "started", "ended", "reason", "samples", "noise", "elapsed_s", "problem",
@@ -17,14 +16,12 @@ OF_BATCHES = ("id", "state", "label", "created", "counts")
 LONGEST = 500  # characters of each part of a problem: the rest is in the render's status
 
 
-def event(ended: Job | Batch) -> str:
+def event(of: Kind, status: dict[str, Any]) -> str:
     """The body of a callback, as JSON: `type` and `timestamp` are those of Standard Webhooks."""
-    names = OF_RENDERS if isinstance(ended, Job) else OF_BATCHES
-    status = ended.status()
+    names = OF_RENDERS if of == "render" else OF_BATCHES
     data: dict[str, Any] = {name: status[name] for name in names if name in status}
     if (problem := data.get("problem")) is not None:
         parts = (name for name in ("type", "title", "detail") if name in problem)
         data["problem"] = {name: str(problem[name])[:LONGEST] for name in parts}
-    kind = "render.ended" if isinstance(ended, Job) else "batch.ended"
-    body = {"type": kind, "timestamp": iso(time.time()), "data": data}
+    body = {"type": f"{of}.ended", "timestamp": iso(time.time()), "data": data}
     return json.dumps(body, ensure_ascii=False, separators=(",", ":"))

@@ -22,10 +22,11 @@ from service.callbacks.events import event
 from service.config import Config
 from service.problems import FieldError, InvalidDocument, ServiceError, TooManyRequests
 from service.renders.job import Job
+from service.renders.status import snapshot
 from service.storage.callback_rows import Callback, CallbackRows, Kind
 from service.storage.database import Database
 from service.system.background import Background, reported
-from service.system.executors import recording, resolving
+from service.system.executors import answering, recording, resolving
 from service.system.shares import Shares
 from service.system.turns import CALLER
 
@@ -114,7 +115,9 @@ class Callbacks:
         if isinstance(subject, Job):
             await subject.recorded()
         kind: Kind = "render" if isinstance(subject, Job) else "batch"
-        await self._stored(partial(self._rows.make_due, kind, subject.id, event(subject), time.time()))
+        status = snapshot(subject) if isinstance(subject, Job) else subject.snapshot()
+        body = await answering(lambda: event(kind, status()))
+        await self._stored(partial(self._rows.make_due, kind, subject.id, body, time.time()))
         self._woken.set()
 
     async def _stored(self, write: Callable[[], None]) -> None:

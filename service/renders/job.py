@@ -13,7 +13,7 @@ from service.renders.life import Life, PictureAt
 from service.renders.ordered import Ordered
 from service.renders.rendering import Rendering
 from service.renders.scene import Load, PackedScenes, RenderScene
-from service.renders.status import status
+from service.renders.status import snapshot
 from service.renders.store.record import Order, Outcome
 from service.renders.viewer import PictureViewer
 from service.system.memory import MemoryBudget
@@ -87,7 +87,7 @@ class Job(Ordered):
         return self.finished.is_set() or not self.life.over.is_set()
 
     def status(self, kernel: bool = False) -> dict[str, Any]:
-        return status(self.order, self.outcome, self.renderers.tracing(self.task), kernel)
+        return snapshot(self, kernel)()
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
         """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""

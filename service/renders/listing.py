@@ -21,7 +21,7 @@ class Page:
 def page(
     newest_first: Iterable[Job], owner: str, label: str | None, state: State | None, limit: int, last: int | None
 ) -> Page:
-    """Those of an owner, of that label and state, whose number is below `last`; none of a batch."""
+    """Those of an owner, of that label and state, whose number is below `last`; none of a batch. For any thread."""
     fits = (
         job
         for job in newest_first

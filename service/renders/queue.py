@@ -29,6 +29,7 @@ from service.renders.store.store import MEMBER_BYTES, RenderStore
 from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.quota import QuotaUsedUp
 from service.system.background import Background
+from service.system.executors import answering
 
 RETRY_S = 5  # when to ask again where there is no room
 CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
@@ -171,7 +172,7 @@ class RenderQueue:
             raise NotFound("There is no render of this id.")
         return job
 
-    def page(
+    async def page(
         self,
         owner: str = "",
         label: str | None = None,
@@ -184,14 +185,16 @@ class RenderQueue:
         Raises InvalidDocument where there never was a render `after`.
         """
         last = None if after is None else self._place(after, owner)
-        return listing.page(reversed(self._jobs.values()), owner, label, state, limit, last)
+        newest_first = list(reversed(self._jobs.values()))
+        return await answering(partial(listing.page, newest_first, owner, label, state, limit, last))
 
     @contextmanager
     def follower(self, owner: str) -> Iterator[Follower[Job]]:
         """Learns of every change of an owner's renders; first of those that are under way."""
         with self._followers.follower(owner) as follower:
-            for job in self._jobs.values():
-                if job.owner == owner and job.batch is None and not job.finished.is_set():
+            under_way = (*self._slots.running, *self._waiting.line(owner))  # not all that are kept: those are many
+            for job in sorted(under_way, key=lambda job: job.number):
+                if job.owner == owner and job.batch is None and job.id in self._jobs and not job.finished.is_set():
                     follower.add(job)
             if self.closing:
                 follower.close()

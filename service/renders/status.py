@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 from service.ipc.leases import undivided
 from service.ipc.messages import Failed
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
 from service.quality import forecast
+from service.renders.ordered import Ordered
 from service.renders.store.record import Order, Outcome
+
+
+def snapshot(render: Ordered, kernel: bool = False) -> Callable[[], dict[str, Any]]:
+    """What makes the status of a render as it is now, for any thread."""
+    return partial(status, render.order, render.outcome, render.renderers.tracing(render.task), kernel)
 
 
 def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False) -> dict[str, Any]:

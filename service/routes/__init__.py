@@ -22,6 +22,7 @@ presets          built-in documents
 metrics          /metrics, in Prometheus' format
 info             what the service is, whether it lives, what its documents look like
 answers          what answers look like, for the API's description
+json_answers     answers whose JSON is made in a thread
 request_fields   what requests for renders and batches share, for the description
 errors           errors as problem+json
 description      openapi.json

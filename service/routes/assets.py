@@ -17,7 +17,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from service import presets
 from service.assets import AssetInfo
 from service.assets.posing import described, posed_scene
-from service.assets.scene_import import Imported
 from service.assets.types import Pose
 from service.http.downloads import FileAnswer
 from service.problems import FieldError, InvalidDocument, UnsupportedMedia
@@ -30,7 +29,7 @@ from service.system.executors import opening, storing, storing_small
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
 FOREVER = "{}, max-age=31536000, immutable"  # the bytes of an id never change: it is their hash
-BYTES = "application/octet-stream"
+BYTES, JSON = "application/octet-stream", "application/json"
 SMALL_ASSET = 1 << 20  # bytes of a file that seldom takes longer than its hash and its record
 HEADER_BYTES = 4096  # proxies refuse headers that are much longer
 
@@ -106,18 +105,17 @@ async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuer
 
     storage, owner, pose = app_state(request).storage, owner_of(request), query.pose()
 
-    def read() -> tuple[Imported, str]:
+    def read() -> Response:
         storage.access.check(owner, id)
         imported = posed_scene(storage.assets, id, pose, partial(storage.shares.room, owner))
         storage.shares.imported(owner, id, imported.references())
-        return imported, dump_json(imported.scene(presets.default_environment()))
+        headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
+        for name in ("exposure", "aspect_ratio", "bounds"):
+            if (value := getattr(imported, name)) is not None:
+                headers[f"sunbox-{name.replace('_', '-')}"] = json.dumps(value)
+        return Response(dump_json(imported.scene(presets.default_environment())), 200, headers, JSON)
 
-    imported, text = await storing(read, caller_of(request))
-    headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
-    for name in ("exposure", "aspect_ratio", "bounds"):
-        if (value := getattr(imported, name)) is not None:
-            headers[f"sunbox-{name.replace('_', '-')}"] = json.dumps(value)
-    return Response(text, media_type="application/json", headers=headers)
+    return await storing(read, caller_of(request))
 
 
 def _fitting(warnings: list[dict[str, Any]]) -> str:
@@ -137,16 +135,15 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
 
     storage, owner = app_state(request).storage, owner_of(request)
 
-    def read() -> str:
+    def read() -> Response:
         storage.access.check(owner, id)
         imported = storage.assets.materials(id)
         storage.shares.imported(owner, id, imported.references())
         document = imported.document
-        return dump_json(
-            {"materials": document["materials"], "textures": document["textures"], "warnings": imported.warnings}
-        )
+        told = {"materials": document["materials"], "textures": document["textures"], "warnings": imported.warnings}
+        return Response(dump_json(told), media_type=JSON)
 
-    return Response(await storing(read, caller_of(request)), media_type="application/json")
+    return await storing(read, caller_of(request))
 
 
 @router.get(
@@ -163,11 +160,11 @@ async def download(request: Request, id: answers.AssetId) -> Response:
     accepted = request.headers.get("accept", "*/*").lower()
     if "application/json" in accepted and "*/*" not in accepted and "octet-stream" not in accepted:
 
-        def describe() -> dict[str, Any]:
+        def describe() -> Response:
             storage.access.check(owner, id)
-            return _described(described(storage.assets, id))
+            return JSONResponse(_described(described(storage.assets, id)), headers={"vary": "Accept"})
 
-        return JSONResponse(await storing(describe, caller_of(request)), headers={"vary": "Accept"})
+        return await storing(describe, caller_of(request))
 
     def find(stack: ExitStack) -> bytes | BinaryIO:
         storage.access.check(owner, id)

@@ -24,7 +24,7 @@ from service.problems import Conflict, FieldError, InvalidDocument, TooLarge
 from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import IdempotencyKey
 from service.requests.batch_request import ParsedBatch
-from service.routes import answers, batch_files, idempotency, waiting
+from service.routes import answers, batch_files, idempotency, json_answers, waiting
 from service.routes.errors import GONE
 from service.routes.examples import BATCH_ID
 from service.routes.idempotency import IdempotencyHeader
@@ -133,7 +133,7 @@ async def status(request: Request, id: BatchId, wait: Wait = 0) -> Response:
     with waiting.place(request) if wait else contextlib.nullcontext():
         if wait and not await waiting.until(request, batch.finished.wait(), wait):
             return Response(status_code=GONE)
-    return JSONResponse(batch.status())
+    return await json_answers.made(batch.snapshot())
 
 
 @router.delete(
@@ -196,7 +196,6 @@ async def animated(request: Request, id: BatchId, query: Annotated[AnimationQuer
 
 def _pictured(batch: Batch) -> list[int]:
     """The steps whose renders are done. Raises Conflict where none is."""
-    steps = sorted(step for step, job in batch.jobs.items() if job.state == "done")
-    if not steps:
+    if not (steps := batch.pictured):
         raise Conflict("None of the batch's renders is done yet.")
     return steps

@@ -8,11 +8,10 @@ from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.renders.status import iso
-from service.routes import answers
+from service.routes import answers, json_answers
 from service.state import app_state, owner_of
 from service.storage.callback_rows import KEPT, KEPT_S, Callback, Kind, State
 from service.system.executors import recording
@@ -61,7 +60,7 @@ async def callbacks(request: Request, query: Annotated[ListQuery, Query()]) -> R
     if len(found) > query.limit:
         following = query.model_copy(update={"after": page[-1].id})
         headers["link"] = f'<callbacks?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
-    return JSONResponse([_told(each) for each in page], headers=headers)
+    return await json_answers.made(lambda: [_told(each) for each in page], headers=headers)
 
 
 def _told(callback: Callback) -> dict[str, Any]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import inspect
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from service import scene
+from service.http.compression import Constant
 from service.routes import example_answers
 from service.routes.answers import PROBLEM, Problem
 from service.scene import axes
+from service.system.executors import answering
 
 HERE, THERE = "#/$defs/", "#/components/schemas/"
 
@@ -63,6 +65,12 @@ OF_FILE, WRITTEN_OUT = ("asset",), ("vertices", "faces", "normals", "uvs", "colo
 def describe(app: FastAPI, keyed: bool) -> None:
     """Make `app` serve this description; `keyed`: calls need a key."""
     app.openapi = partial(_described, app, keyed)  # type: ignore[method-assign]
+    written = cache(lambda: Constant(app.openapi()))
+
+    async def description(request: Request) -> Response:
+        return (await answering(written)).answer(request)
+
+    app.add_api_route("/openapi.json", description, include_in_schema=False)
 
 
 def _described(app: FastAPI, keyed: bool) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Annotated
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi.responses import JSONResponse
 
 from service.exports import FORMATS, material_format, material_scene, scene_format
 from service.routes import answers, exporting
@@ -66,18 +67,28 @@ IfMatch = Annotated[str | None, Header(description="The `ETag` that the document
 IfNoneMatch = Annotated[str | None, Header(description="`*`: there must be no document of this name.")]
 
 
-@router.get("/{kind}", summary="Names and titles", responses=answers.problems(404, 422))
+@router.get(
+    "/{kind}",
+    summary="Names and titles",
+    response_class=JSONResponse,
+    responses=answers.shaped(list[answers.Named]) | answers.problems(404, 422),
+)
 async def names(
-    request: Request, response: Response, kind: answers.DocumentKind, limit: Limit = MOST_NAMES, after: After = None
-) -> list[answers.Named]:
+    request: Request, kind: answers.DocumentKind, limit: Limit = MOST_NAMES, after: After = None
+) -> Response:
     """Of one's own documents and of those that others share, in the order of the titles; without keys of all. Those
     that were saved `by_link` are left out. `Link` with `rel=next` leads to the next page while there is one."""
     documents, owner = app_state(request).storage.documents, owner_of(request)
-    found, more = await saving(partial(documents.names, kind, owner, limit, after))
-    if more:
-        following = urlencode({"limit": limit, "after": max(each["name"] for each in found)})
-        response.headers["link"] = f'<{kind}?{following}>; rel="next"'
-    return [answers.Named(**entry) for entry in found]
+
+    def read() -> Response:
+        found, more = documents.names(kind, owner, limit, after)
+        headers = {}
+        if more:
+            following = urlencode({"limit": limit, "after": max(each["name"] for each in found)})
+            headers["link"] = f'<{kind}?{following}>; rel="next"'
+        return JSONResponse(found, headers=headers)
+
+    return await saving(read)
 
 
 @router.get(

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
-from functools import cache
-from typing import Annotated, Any
+from functools import cache, lru_cache, partial
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import scene
+from service.http.compression import Constant
 from service.problems import FieldError, InvalidDocument
-from service.routes import answers
+from service.routes import answers, json_answers
 from service.routes.metrics import MIME, scrape
 from service.scene import brief
 from service.scene.material import MODELS
 from service.state import app_state
 from service.streams import protocol
+from service.system.executors import answering
 
 router = APIRouter(tags=["service"])
 
@@ -56,8 +57,9 @@ async def metrics(request: Request) -> Response:
     response_model=None,
     responses=answers.shaped(answers.Info),
 )
-async def info(request: Request) -> dict[str, Any]:
-    return await app_state(request).info()
+async def info(request: Request) -> Response:
+    found = await app_state(request).info()
+    return await json_answers.made(lambda: found)
 
 
 class SchemaQuery(BaseModel):
@@ -74,23 +76,24 @@ class SchemaQuery(BaseModel):
     response_class=JSONResponse,
     responses=answers.shaped(answers.Schemas) | answers.problems(422),
 )
-async def schema(query: Annotated[SchemaQuery, Query()]) -> Response:
+async def schema(request: Request, query: Annotated[SchemaQuery, Query()]) -> Response:
     if query.model is None:
         if query.brief:
             raise InvalidDocument([FieldError("/brief", "needs `model` beside it")])
-        return Response(await asyncio.to_thread(_schema), media_type="application/json")
-    found = await asyncio.to_thread(_model, query.model)
-    if found is None:
-        raise InvalidDocument([FieldError("/model", f"is not one of {', '.join(sorted(MODELS))}")])
-    return JSONResponse(brief.brief(found) if query.brief else found)
+        return (await answering(_schema)).answer(request)
+    return (await answering(partial(_model, query.model, query.brief))).answer(request)
 
 
 @cache
-def _schema() -> bytes:
-    """The schemas as JSON; they never change, and making them takes 0.2 s."""
-    document = scene.schema() | {"view": protocol.View.model_json_schema()}
-    return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+def _schema() -> Constant:
+    """The schemas; making them takes 0.2 s."""
+    return Constant(scene.schema() | {"view": protocol.View.model_json_schema()})
 
 
-def _model(model: str) -> dict[str, Any] | None:
-    return brief.model_schema(json.loads(_schema())["scene"], model)
+@lru_cache(2 * len(MODELS))
+def _model(model: str, is_brief: bool) -> Constant:
+    """The schema of one material's model. Raises InvalidDocument."""
+    found = brief.model_schema(json.loads(_schema().plain)["scene"], model)
+    if found is None:
+        raise InvalidDocument([FieldError("/model", f"is not one of {', '.join(sorted(MODELS))}")])
+    return Constant(brief.brief(found) if is_brief else found)

@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from functools import cache, partial
+from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Request, Response
+from fastapi.responses import JSONResponse
 
 from service import presets
+from service.http.compression import Constant
 from service.routes import answers
+from service.system.executors import answering
 
 router = APIRouter(prefix="/v1/presets", tags=["presets"])
 
 
-@router.get("/{kind}", summary="Names and titles", response_model_exclude_none=True, responses=answers.problems(404))
-def names(kind: answers.PresetKind) -> list[answers.NamedPreset]:
-    return [answers.NamedPreset(**entry) for entry in presets.names(kind)]
+@router.get(
+    "/{kind}",
+    summary="Names and titles",
+    response_class=JSONResponse,
+    responses=answers.shaped(list[answers.NamedPreset]) | answers.problems(404),
+)
+async def names(request: Request, kind: answers.PresetKind) -> Response:
+    return (await answering(partial(_names, kind))).answer(request)
 
 
 @router.get(
     "/{kind}/{name}",
     summary="The bare document",
-    response_model=None,
+    response_class=JSONResponse,
     responses=answers.DOCUMENT | answers.problems(404),
 )
-def preset(kind: answers.PresetKind, name: Annotated[str, Path(examples=[presets.DEFAULT_SCENE])]) -> dict[str, Any]:
-    return presets.get(kind, name)
+async def preset(
+    request: Request, kind: answers.PresetKind, name: Annotated[str, Path(examples=[presets.DEFAULT_SCENE])]
+) -> Response:
+    return (await answering(partial(_preset, kind, name))).answer(request)
+
+
+@cache
+def _names(kind: str) -> Constant:
+    """Raises NotFound."""
+    return Constant(presets.names(kind))
+
+
+@cache
+def _preset(kind: str, name: str) -> Constant:
+    """Raises NotFound."""
+    return Constant(presets.get(kind, name))

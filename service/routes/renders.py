@@ -26,9 +26,10 @@ from service.ipc import messages
 from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.renders.job import Job
+from service.renders.status import snapshot
 from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
-from service.routes import answers, events, submission, waiting
+from service.routes import answers, events, json_answers, submission, waiting
 from service.routes.errors import GONE
 from service.routes.idempotency import IdempotencyHeader
 from service.scene.look import Lut, ToneMap, shown_as
@@ -161,12 +162,14 @@ async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHe
     responses=answers.shaped(list[answers.Render]) | answers.problems(422),
 )
 async def renders(request: Request, query: Annotated[ListQuery, Query()]) -> Response:
-    page = app_state(request).render_queue.page(owner_of(request), query.label, query.state, query.limit, query.after)
+    renders, owner = app_state(request).render_queue, owner_of(request)
+    page = await renders.page(owner, query.label, query.state, query.limit, query.after)
     headers = dict[str, str]()
     if page.more:
         following = query.model_copy(update={"after": page.renders[-1].id})
         headers["link"] = f'<renders?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
-    return JSONResponse([job.status() for job in page.renders], headers=headers)
+    listed = [snapshot(job) for job in page.renders]
+    return await json_answers.made(lambda: [status() for status in listed], headers=headers)
 
 
 @router.get(

@@ -96,6 +96,7 @@ storing_small = Pool("small", 3, NICENESS)  # those of up to a megabyte: millise
 opening = Pool("opening", 3, NICENESS)  # finds assets and keeps them from being deleted: milliseconds
 saving = Pool("saving", 3)  # documents: the disk's time
 encoding = Pool("encoding", 3)  # frames to JPEG and the like: milliseconds, while a person watches
+answering = Pool("answering", 2)  # lists as JSON: milliseconds
 writing = Pool("writing", 3, WRITING_NICENESS)  # pictures to files: seconds for the largest
 filming = Pool("filming", 2, WRITING_NICENESS)  # waits for processes that write animations: minutes
 comparing = Pool("comparing", 3, WRITING_NICENESS)  # pictures: seconds for the largest

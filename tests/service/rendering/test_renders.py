@@ -68,8 +68,8 @@ def keeping(bounds: QueueLimits, scenario: Callable[[Any], Awaitable[None]]) -> 
 def test_the_oldest_of_an_owner_make_room() -> None:
     async def scenario(renders: Any) -> None:
         await ended(renders, *(Job(f"a{i}", "a") for i in range(4)), Job("b0", "b"))
-        assert [job.id for job in renders.page("a").renders] == ["a3", "a2"]
-        assert [job.id for job in renders.page("b").renders] == ["b0"]
+        assert [job.id for job in (await renders.page("a")).renders] == ["a3", "a2"]
+        assert [job.id for job in (await renders.page("b")).renders] == ["b0"]
         with pytest.raises(Gone):
             renders.get("a0", "a")
         with pytest.raises(NotFound):
@@ -116,7 +116,7 @@ def test_others_do_not_hear_of_it() -> None:
         for owner in ("b", ""):
             with pytest.raises(NotFound):
                 renders.get("mine", owner)
-            assert renders.page(owner).renders == []
+            assert (await renders.page(owner)).renders == []
         await renders.close()
 
     keeping(LIMITS, scenario)
@@ -223,19 +223,19 @@ def test_pages() -> None:
             await renders.submit(Job(f"a{i}", "a", label="odd" if i % 2 else None))
         await renders.submit(Job("b", "b"))
 
-        def page(**query: Any) -> tuple[list[str], bool]:
-            found = renders.page("a", **query)
+        async def page(**query: Any) -> tuple[list[str], bool]:
+            found = await renders.page("a", **query)
             return [job.id for job in found.renders], found.more
 
-        assert page(limit=2) == (["a4", "a3"], True)
-        assert page(limit=2, after="a3") == (["a2", "a1"], True)
-        assert page(limit=2, after="a1") == (["a0"], False)
-        assert page(limit=2, label="odd") == (["a3", "a1"], False)
+        assert await page(limit=2) == (["a4", "a3"], True)
+        assert await page(limit=2, after="a3") == (["a2", "a1"], True)
+        assert await page(limit=2, after="a1") == (["a0"], False)
+        assert await page(limit=2, label="odd") == (["a3", "a1"], False)
         await asyncio.sleep(0.01)
-        assert page(state="queued") == (["a4", "a3", "a2", "a1"], False)
+        assert await page(state="queued") == (["a4", "a3", "a2", "a1"], False)
         for other in ("b", "unknown"):
             with pytest.raises(InvalidDocument):
-                page(after=other)
+                await page(after=other)
         await renders.close()
 
     keeping(replace(LIMITS, running=1), scenario)

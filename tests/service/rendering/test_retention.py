@@ -205,7 +205,7 @@ def test_what_is_deleted_is_gone_from_everywhere(tmp_path: Path) -> None:
         await disk.queue.delete(job)
         with disk.kept.documents.assets_in_use() as in_use:
             assert asset not in in_use
-        assert disk.queue.page("a").renders == [] and disk.queue.kept == 0
+        assert (await disk.queue.page("a")).renders == [] and disk.queue.kept == 0
         assert disk.store.latest("id") is None and not list((tmp_path / "renders").iterdir())
         with pytest.raises(Gone, match="deleted"):
             disk.queue.get("id", "a")

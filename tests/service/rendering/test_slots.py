@@ -67,7 +67,7 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
         stranger = Job(renderers, Order("stranger", "", SETTINGS), load, b"small", PACKED, budget=MemoryBudget())  # type: ignore[arg-type]
         await queue.submit(stranger, listed=False)
         await until(stranger.finished.is_set)
-        jobs = queue.page().renders
+        jobs = (await queue.page()).renders
         await until(lambda: all(job.finished.is_set() for job in jobs))
         assert {job.state for job in jobs} == {"done"} and len(read) <= 16  # once to learn how large it is
         await queue.close()

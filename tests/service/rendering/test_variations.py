@@ -65,7 +65,7 @@ def test_a_document_is_stored_once_and_each_render_has_its_own_scene(tmp_path: P
         store, renderers = RenderStore(tmp_path), Quick()  # the next server's
         queue = RenderQueue(LIMITS, store)
         queue.resume(store.load(), lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome))  # type: ignore[arg-type]
-        jobs = queue.page().renders
+        jobs = (await queue.page()).renders
         await until(lambda: all(job.state == "done" for job in jobs))
         scenes = [merge_patch(SCENE, patch) for patch in PATCHES]
         assert sorted(rendered, key=lambda scene: scene["camera"]["vfov"]) == scenes
