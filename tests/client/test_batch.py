@@ -26,7 +26,7 @@ def test_a_batch(server: Server) -> None:
         assert client.batch_of(batch.id).status()["label"] == "two"
         assert Image.open(BytesIO(batch.animation("gif", width=16))).size == (16, 12)
         assert batch.sheet()[1:4] == b"PNG" and batch.zip()[:2] == b"PK"
-        with pytest.raises(ValueError, match=r"must end in one of"):
+        with pytest.raises(sunbox.Refused, match=r"must end in one of"):
             batch.save_sheet("sheet.bmp")
         batch.delete()
         with pytest.raises(sunbox.NotFound):

@@ -88,7 +88,7 @@ def test_files_have_the_format_of_their_names(client: sunbox.Client, tmp_path: P
 
 
 def test_other_names_are_refused(client: sunbox.Client, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="must end in one of"):
+    with pytest.raises(sunbox.Refused, match="must end in one of"):
         next(iter(client.jobs(state="done"))).result().save(tmp_path / "a.gif")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import threading
 from collections.abc import Iterator
@@ -11,14 +12,16 @@ from typing import Any, ClassVar
 import pytest
 
 import sunbox
-from sunbox.transport import FIRST_PAUSE_S, _pause
+from sunbox.transport import FIRST_CONTACT_S, FIRST_PAUSE_S, PATIENCE_S, SHORTEST_PAUSE_S, Again, _pause
+from tests.counting import in_simulated_time
 
 STATUS = {"id": "a", "state": "done", "samples": 1, "noise": None, "warnings": [], "settings": {"max_samples": 1}}
 PROBLEM = {"title": "Full", "status": 503, "detail": "Too much is waiting.", "errors": []}
 
 
 class Scripted(BaseHTTPRequestHandler):
-    """Answers the n-th request by the n-th of `script`: a status and a document; None breaks the connection."""
+    """Answers the n-th request by the n-th of `script`, and all further ones by the last: a status and a document;
+    None breaks the connection."""
 
     protocol_version = "HTTP/1.1"
     script: ClassVar[list[Any]] = []
@@ -29,7 +32,7 @@ class Scripted(BaseHTTPRequestHandler):
         self.asked.append(
             (self.command, self.path, {k.lower(): v for k, v in self.headers.items()} | {"body": body.decode()})
         )
-        step = self.script.pop(0)
+        step = self.script.pop(0) if len(self.script) > 1 else self.script[0]
         if step is None:
             self.close_connection = True
             return
@@ -54,7 +57,7 @@ def scripted() -> Iterator[tuple[sunbox.Client, list[Any], list[Any]]]:
     Scripted.script, Scripted.asked = [], []
     with ThreadingHTTPServer(("127.0.0.1", 0), Scripted) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        with sunbox.Client(f"http://127.0.0.1:{server.server_address[1]}", key="k", retries=2) as client:
+        with sunbox.Client(f"http://127.0.0.1:{server.server_address[1]}", key="k") as client:
             yield client, Scripted.script, Scripted.asked
         server.shutdown()
 
@@ -97,10 +100,11 @@ def test_server_that_says_when_is_heard(scripted: Any, monkeypatch: pytest.Monke
 
 def test_full_server_gives_its_reason_at_last(scripted: Any) -> None:
     client, script, asked = scripted
-    script += [json_answer(503, PROBLEM)] * 3
+    script += [json_answer(503, PROBLEM)]
+    client._client._transport.patience = 0.3
     with pytest.raises(sunbox.Failed, match="Too much is waiting") as failed:
         client.info()
-    assert failed.value.status == 503 and len(asked) == 3
+    assert failed.value.status == 503 and len(asked) > 1
 
 
 def test_refusal_is_not_asked_again(scripted: Any) -> None:
@@ -132,7 +136,8 @@ def test_events_that_end_too_early_are_asked_for_again(scripted: Any) -> None:
     done = f"event: done\ndata: {json.dumps(STATUS)}\n\n".encode()
     script += [(200, running, "text/event-stream"), None, (200, done, "text/event-stream")]
     assert [status["state"] for status in client.job("a").events()] == ["running", "done"]
-    script += [(200, running, "text/event-stream"), None, None, None]
+    script[:] = [(200, running, "text/event-stream"), None]
+    client._client._transport.patience = 0.3
     with pytest.raises(sunbox.Unreachable):
         list(client.job("a").events())
 
@@ -145,7 +150,31 @@ def test_failed_render_says_why(scripted: Any) -> None:
         client.job("a").result()
 
 
+def test_patience_lasts_as_long_as_it_says() -> None:
+    """By default longer than the 15 s in which a server ends and the seconds in which it starts again; the last
+    attempt is made at the end, and a server that says "at once" is not asked without a pause."""
+
+    async def attempts(patience_s: float, most_s: float | None = None, said: str | None = None) -> tuple[int, float]:
+        again, clock = Again(patience_s), asyncio.get_running_loop().time
+        began, count = clock(), 1
+        while await again.after(most_s, said):
+            count += 1
+        return count, clock() - began
+
+    async def test() -> None:
+        count, took_s = await attempts(PATIENCE_S)
+        assert took_s == pytest.approx(60) and 10 < count < 40
+        count, took_s = await attempts(PATIENCE_S, FIRST_CONTACT_S)
+        assert took_s == pytest.approx(5)
+        assert await attempts(0) == (1, 0)
+        assert await attempts(10, said="75") == (2, pytest.approx(10))
+        count, took_s = await attempts(10, said="0")
+        assert took_s == pytest.approx(10) and count <= 10 / SHORTEST_PAUSE_S + 2
+
+    in_simulated_time(test())
+
+
 def test_nobody_there() -> None:
-    with sunbox.Client("http://127.0.0.1:1", retries=0) as client, pytest.raises(sunbox.Unreachable) as error:
+    with sunbox.Client("http://127.0.0.1:1", patience=0) as client, pytest.raises(sunbox.Unreachable) as error:
         client.info()
     assert error.value.status is None and "127.0.0.1:1" in str(error.value)

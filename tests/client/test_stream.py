@@ -107,7 +107,7 @@ def test_forgotten_session_begins_again(server: Server) -> None:
 
 def test_refused_connection_says_why(server: Server) -> None:
     async def opened() -> None:
-        async with sunbox.AsyncClient("http://127.0.0.1:1", retries=0) as client, client.stream(SCENE):
+        async with sunbox.AsyncClient("http://127.0.0.1:1", patience=0) as client, client.stream(SCENE):
             pass
 
     with pytest.raises(sunbox.Unreachable, match=r"127\.0\.0\.1:1"):

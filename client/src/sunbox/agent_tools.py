@@ -42,7 +42,8 @@ from sunbox.async_job import AsyncJob, AsyncPicture, Status
 from sunbox.errors import Failed, NotFound, Refused, SunboxError
 from sunbox.transport import Transport
 
-TIMEOUT_S, RETRIES = 90.0, 3  # longer than one call waits
+TIMEOUT_S = 90.0  # longer than one call waits
+PATIENCE_S = 20.0  # with a server that restarts: whoever asked for the call waits for its answer
 MOST_VALUES = 36  # pictures of one sheet
 MOST_PAIRS = 256  # of directions: some 15 KB of numbers
 MOST_LISTED = 60  # materials
@@ -105,7 +106,7 @@ def told(tool: Callable[P, Awaitable[CallToolResult]]) -> Callable[P, Awaitable[
 def agent_server(url: str | None, key: str | None = None) -> MCPServer[None]:
     """Of the Sunbox server at an address; `key` and address come from the environment where they are None. Raises
     ValueError for what is no address."""
-    tools = AgentTools(Transport(url, key, TIMEOUT_S, RETRIES))
+    tools = AgentTools(Transport(url, key, TIMEOUT_S, PATIENCE_S))
 
     @asynccontextmanager
     async def lifespan(server: MCPServer[None]) -> AsyncIterator[None]:

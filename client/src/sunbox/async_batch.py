@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
 
-from sunbox.async_job import AsyncJob, AsyncPicture, Status
+from sunbox.async_job import AsyncJob, AsyncPicture, Status, unknown_ending
 from sunbox.errors import Failed, SunboxError
 from sunbox.progress import Line
 from sunbox.transport import Transport
@@ -72,12 +72,12 @@ class AsyncBatch:
         return await self._file("images.zip", format=format, **view)
 
     async def save_sheet(self, path: str | Path, width: int | None = None, **view: Any) -> None:
-        """The contact sheet in the format of the path's ending. Raises ValueError, OSError."""
+        """The contact sheet in the format of the path's ending. Raises OSError, SunboxError."""
         data = await self.sheet(_format(path, SHEETS), width, **view)
         await asyncio.to_thread(Path(path).write_bytes, data)
 
     async def save_animation(self, path: str | Path, fps: float = 24, width: int | None = None, **view: Any) -> None:
-        """The animation in the format of the path's ending; .png is an APNG. Raises ValueError, OSError."""
+        """The animation in the format of the path's ending; .png is an APNG. Raises OSError, SunboxError."""
         data = await self.animation(_format(path, ANIMATIONS), fps, width, **view)
         await asyncio.to_thread(Path(path).write_bytes, data)
 
@@ -124,5 +124,5 @@ class AsyncBatch:
 def _format(path: str | Path, formats: dict[str, str]) -> str:
     found = formats.get(Path(path).suffix.lower())
     if found is None:
-        raise ValueError(f"{path}: the name must end in one of {', '.join(formats)}")
+        raise unknown_ending(path, formats)
     return found

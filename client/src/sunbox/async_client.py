@@ -17,25 +17,32 @@ from sunbox import exports, files, lobes, verdicts
 from sunbox.async_batch import AsyncBatch
 from sunbox.async_job import AsyncJob, AsyncPicture
 from sunbox.async_stream import AsyncStream
-from sunbox.transport import Transport
+from sunbox.files import Folders
+from sunbox.transport import PATIENCE_S, TIMEOUT_S, Transport
 
 PAGE = 200
 
 
 class AsyncClient:
     """`url` and `key` come from SUNBOX_URL and SUNBOX_API_KEY, the address else is http://127.0.0.1:8000. `timeout`:
-    seconds without a byte. `retries`: how often a request is sent again where the server is full, restarts or cannot
-    be reached.
+    seconds without a byte. `patience`: for how many seconds a request is sent again where the server is full, ends or
+    starts; a restart takes less than the default. An address where nothing has ever answered is given up after 5.
 
     A scene is a dict as the service's documentation has it, or a path to its JSON file. Numpy arrays may stand for
     lists; files may be named by path (in a dict relative to the working directory, in a file to its folder) and are
-    uploaded once. Every call raises SunboxError where the server refuses or cannot.
+    uploaded once. They lie in that folder, or in one of `asset_root`: whoever wrote a document has no others sent.
+    Every call raises SunboxError where the server refuses or cannot.
     """
 
     def __init__(
-        self, url: str | None = None, key: str | None = None, timeout: float = 60.0, retries: int = 5
+        self,
+        url: str | None = None,
+        key: str | None = None,
+        timeout: float = TIMEOUT_S,
+        patience: float = PATIENCE_S,
+        asset_root: Folders = (),
     ) -> None:
-        self._transport = Transport(url, key, timeout, retries)
+        self._transport = Transport(url, key, timeout, patience, asset_root)
 
     @property
     def url(self) -> str:
@@ -217,7 +224,7 @@ class AsyncClient:
         it and see it listed; `by_link`: whoever knows the name may read it."""
         query = {"shared": str(shared).lower()} if shared is not None else {}
         query |= {"by_link": "true"} if by_link else {}
-        body = await self._transport.uploaded(document)
+        body = await self._transport.uploaded(document, "")
         await self._transport.json("PUT", f"{_saved(kind, name)}?{urlencode(query)}", body)
 
     async def delete_document(self, kind: str, name: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -91,6 +91,12 @@ class AsyncJob:
         return (await self._transport.request("GET", f"{self._path}/image?{query}")).content
 
 
+def unknown_ending(path: str | Path, formats: Iterable[str]) -> Refused:
+    """A file of that name has no format."""
+    detail = f"the name must end in one of {', '.join(formats)}"
+    return Refused(f"{path}: {detail}", errors=[("/path", detail)])
+
+
 Fetch = Callable[[str, dict[str, Any]], Awaitable[bytes]]
 
 
@@ -144,11 +150,11 @@ class AsyncPicture:
 
     async def save(self, path: str | Path, **view: Any) -> None:
         """A file in the format of its ending: .png, .jpg, .webp, .avif, .exr, .hdr or .npy. `view`: bits, exposure,
-        tone_map, color_space, lut, aov. Raises ValueError, OSError, Refused."""
+        tone_map, color_space, lut, aov. Raises OSError, SunboxError."""
         path = Path(path)
         format = FORMATS.get(path.suffix.lower())
         if format is None:
-            raise ValueError(f"{path}: the name must end in one of {', '.join(FORMATS)}")
+            raise unknown_ending(path, FORMATS)
         data = await self.fetch(format, **view)
         await asyncio.to_thread(path.write_bytes, data)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import dataclass, replace
 from functools import reduce
 from types import TracebackType
 from typing import Any
@@ -14,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from sunbox import files, frames
 from sunbox.errors import Failed, Refused, Unreachable, from_problem
 from sunbox.merge import merged
-from sunbox.transport import Transport
+from sunbox.transport import FIRST_CONTACT_S, Transport
 
 GONE, LOST = 4404, 4500  # close codes of the server
 REFUSED = {
@@ -23,7 +24,16 @@ REFUSED = {
     4403: "the origin",
     4409: "the session is used elsewhere",
 }
-PAUSE_S = 0.5  # before the connection is taken up again, longer each time
+
+
+VERSIONS = 16  # scenes that the server took and that it may go back to
+
+
+@dataclass(frozen=True)
+class _Version:
+    generation: int
+    scene: files.Scene
+    settings: dict[str, Any]
 
 
 class AsyncStream:
@@ -31,30 +41,51 @@ class AsyncStream:
     program gets fewer frames, never older ones. A connection that breaks is taken up again, the samples are kept.
 
     The iteration ends when the picture is done; after an `update` it can be iterated again. An update that the server
-    refuses raises Refused at the next frame; the stream stays at the last valid scene and may be gone on with.
+    refuses raises Refused in the iteration once, with the pointer of the field; iterated again, the stream goes on
+    with frames of the last valid scene.
     """
 
-    def __init__(self, transport: Transport, scene: Any, format: str, settings: dict[str, Any]) -> None:
+    def __init__(
+        self, transport: Transport, scene: Any, format: str, settings: dict[str, Any], generation: int = 0
+    ) -> None:
+        """`generation`: that of the scene that it begins with."""
         self._transport, self._given, self._view = transport, scene, {"format": format}
-        self._settings: dict[str, Any] = dict(settings)
-        self._scene: files.Scene = {}
+        # What the server took, the newest last; it goes back where a renderer fails at one.
+        self._versions = [_Version(generation, {}, dict(settings))]
         self._socket: ClientConnection | None = None
         self._session: str | None = None
         self._unseen: list[dict[str, Any]] = []  # updates that the server may not have taken yet, in order
+        self._count = generation  # of the last update
         self._unacknowledged: int | None = None
-        self._attempt = 0
+        self._again_after = transport.again()
         self._mending = asyncio.Lock()  # an update may be sent while a frame is waited for: one of them reconnects
-        self._samples = -1  # of the last frame as it is to look now
-        self.generation = 0
-        self.done: dict[str, Any] | None = None
+        self._last = (-1, -1)  # generation and samples of the last frame as it is to look now
+        self._overtaken: frames.Frame | None = None  # the newest that an update had overtaken, which may be refused
+        self._done: dict[str, Any] | None = None  # the last word that a picture is done
+
+    @property
+    def generation(self) -> int:
+        """Of the last update, but for those that were refused."""
+        return int(self._unseen[-1]["generation"]) if self._unseen else self._version.generation
+
+    @property
+    def _version(self) -> _Version:
+        return self._versions[-1]
+
+    @property
+    def done(self) -> dict[str, Any] | None:
+        """Why the picture is done, with its samples and noise; None before."""
+        return self._done if self._done is not None and self._done["generation"] == self.generation else None
 
     @property
     def scene(self) -> files.Scene:
         """The document with all updates but those that were refused."""
-        return files.plain(reduce(lambda scene, update: merged(scene, update["scene"]), self._unseen, self._scene))
+        taken = self._version.scene
+        return files.plain(reduce(lambda scene, update: merged(scene, update["scene"]), self._unseen, taken))
 
     async def __aenter__(self) -> AsyncStream:
-        self._scene = await self._transport.uploaded(self._given)
+        scene = await self._transport.uploaded(self._given)
+        self._versions = [replace(self._version, scene=scene)]
         await self._connect()
         return self
 
@@ -72,13 +103,17 @@ class AsyncStream:
             await self._send({"type": "ack", "seq": self._unacknowledged})
             self._unacknowledged = None
         while not self._is_over():
+            if (frame := self._overtaken) is not None and frame.generation == self.generation:
+                self._overtaken, self._last = None, (frame.generation, frame.samples)
+                return frame
             message = await self._receive()
             if isinstance(message, bytes):
                 frame = frames.parse(message)
                 self._taken(frame.generation)
                 if frame.generation == self.generation:
-                    self._unacknowledged, self._samples = frame.seq, frame.samples
+                    self._unacknowledged, self._last = frame.seq, (frame.generation, frame.samples)
                     return frame
+                self._overtaken = frame
                 await self._send({"type": "ack", "seq": frame.seq})
             else:
                 self._heard(json.loads(message))
@@ -92,8 +127,8 @@ class AsyncStream:
             settings = {**patch.get("settings", {}), **settings}
             patch = patch.get("scene", {})
         change = await self._transport.uploaded(patch)
-        self.generation, self.done, self._samples = self.generation + 1, None, -1
-        message = {"type": "update", "generation": self.generation, "scene": change, "settings": settings}
+        self._count += 1
+        message = {"type": "update", "generation": self._count, "scene": change, "settings": settings}
         self._unseen.append(message)
         await self._send(message)
 
@@ -101,7 +136,7 @@ class AsyncStream:
         """How frames look: format, quality, exposure, tone_map, color_space, lut, aov, max_fps, bits, prior. The
         picture goes on; where it is done, another frame comes."""
         self._view |= view
-        self._samples = -1
+        self._last, self._overtaken = (-1, -1), None
         await self._send({"type": "view", **view})
 
     async def pause(self) -> None:
@@ -130,14 +165,12 @@ class AsyncStream:
             except (OSError, ConnectionClosed, InvalidHandshake, TimeoutError) as error:
                 await self._again(error)
         self._unacknowledged = None  # the server begins to count anew
-        if hello["session"] == self._session:
-            for message in self._unseen:  # the server may have taken it
-                await self._socket.send(files.text(message))
-            return
-        self._session = hello["session"]
-        self._taken(self.generation)
-        start = {"type": "start", "generation": self.generation, "scene": self._scene, "settings": self._settings}
-        await self._socket.send(files.text({**start, "view": self._view}))
+        if hello["session"] != self._session:
+            self._session = hello["session"]
+            start = {"type": "start", **vars(self._version), "view": self._view}
+            await self._socket.send(files.text(start))
+        for message in self._unseen:  # the server may have taken it
+            await self._socket.send(files.text(message))
 
     async def _send(self, message: dict[str, Any]) -> None:
         if self._socket is None:
@@ -157,7 +190,7 @@ class AsyncStream:
             socket = self._socket
             try:
                 message = await socket.recv()
-                self._attempt = 0
+                self._again_after = self._transport.again()
                 return message
             except ConnectionClosed as error:
                 await self._taken_up(error, socket)
@@ -179,31 +212,37 @@ class AsyncStream:
         if code == GONE:
             self._session = None
             return
-        if self._attempt >= self._transport.retries:
+        if not await self._again_after.after(None if self._session else FIRST_CONTACT_S):
             raise Unreachable(f"No stream to {self._transport.url}: {said or error or type(error).__name__}.", code)
-        await asyncio.sleep(PAUSE_S * 2.0**self._attempt)
-        self._attempt += 1
 
     def _is_over(self) -> bool:
         """The last frame may come before or after the word that the picture is done."""
-        return self.done is not None and self._samples >= self.done["samples"]
+        generation, samples = self._last
+        return self.done is not None and generation == self.generation and samples >= self.done["samples"]
 
     def _heard(self, message: dict[str, Any]) -> None:
         if message["type"] == "error":
             problem = from_problem(message["problem"], int(message["problem"].get("status", 500)))
             if problem.pointer == "/generation":  # an update that was sent again, and had arrived before
                 return
-            self._unseen = [each for each in self._unseen if each["generation"] != message["generation"]]
+            refused = message["generation"]
+            self._unseen = [each for each in self._unseen if each["generation"] != refused]
+            if self._version.generation == refused:
+                self._go_back(refused - 1)
             raise problem
-        if message["type"] == "done" and message["generation"] == self.generation:
-            self._taken(self.generation)
-            self.done = message
+        if message["type"] == "done":
+            self._taken(message["generation"])
+            self._done = message
 
     def _taken(self, generation: int) -> None:
-        """The server has the updates up to this one."""
+        """The server has the updates up to this one, or went back to it."""
+        self._go_back(generation)
         while self._unseen and self._unseen[0]["generation"] <= generation:
-            update = self._unseen.pop(0)
-            self._scene, self._settings = (
-                merged(self._scene, update["scene"]),
-                merged(self._settings, update["settings"]),
-            )
+            update, before = self._unseen.pop(0), self._version
+            scene, settings = merged(before.scene, update["scene"]), merged(before.settings, update["settings"])
+            self._versions = [*self._versions, _Version(update["generation"], scene, settings)][-VERSIONS:]
+
+    def _go_back(self, generation: int) -> None:
+        """Forget the versions after this one."""
+        while len(self._versions) > 1 and self._version.generation > generation:
+            self._versions.pop()

@@ -19,6 +19,7 @@ from sunbox.background import Background
 from sunbox.exports import Exported
 from sunbox.frames import Frame
 from sunbox.lobes import Albedo, Bsdf
+from sunbox.transport import PATIENCE_S, TIMEOUT_S
 from sunbox.verdicts import Verdict
 
 T = TypeVar("T")
@@ -31,9 +32,14 @@ class Client:
     manager."""
 
     def __init__(
-        self, url: str | None = None, key: str | None = None, timeout: float = 60.0, retries: int = 5
+        self,
+        url: str | None = None,
+        key: str | None = None,
+        timeout: float = TIMEOUT_S,
+        patience: float = PATIENCE_S,
+        asset_root: files.Folders = (),
     ) -> None:
-        self._client = AsyncClient(url, key, timeout, retries)
+        self._client = AsyncClient(url, key, timeout, patience, asset_root)
 
     @property
     def url(self) -> str:

@@ -34,7 +34,7 @@ class Failed(SunboxError):
 
 
 class Unreachable(SunboxError):
-    """No answer came: the server is not there, or the connection broke more often than `retries` allows."""
+    """No answer came: the server is not there, or it did not come back within `patience`."""
 
 
 def from_problem(problem: Any, status: int) -> SunboxError:

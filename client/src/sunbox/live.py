@@ -130,9 +130,9 @@ class LivePicture:
             self._is_paused = is_paused
             await (self._stream.pause() if is_paused else self._stream.resume())
 
-    def _opened(self, scene: Any) -> AsyncStream:
+    def _opened(self, scene: Any, generation: int = 0) -> AsyncStream:
         transport, format, settings = self._how
-        return AsyncStream(transport, scene, format, settings)
+        return AsyncStream(transport, scene, format, settings, generation)
 
     def _rest(self) -> None:
         """Gives the stream back after a while, unless somebody looks."""
@@ -154,8 +154,7 @@ class LivePicture:
         async with self._waking:
             if not self._is_asleep:
                 return
-            stream = self._opened(self._stream.scene)
-            stream.generation = self._stream.generation + 1
+            stream = self._opened(self._stream.scene, self._stream.generation + 1)
             await stream.__aenter__()
             self._stream, self._is_asleep, self._is_paused = stream, False, False
             self._task = asyncio.create_task(self._run())

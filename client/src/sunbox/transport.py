@@ -22,18 +22,30 @@ from sunbox.errors import NotFound, SunboxError, Unreachable, from_problem
 
 ADDRESS = "http://127.0.0.1:8000"
 AGAIN = {429, 503}  # the server is full, or starting: it says when to come again
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 30.0
-FIRST_CONTACT = 3  # retries where nothing has ever answered at an address: more likely a mistake than a restart
+SHORTEST_PAUSE_S, FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.1, 0.25, 5.0
+TIMEOUT_S = 60.0
+PATIENCE_S = 60.0  # a server takes up to 15 s to end, and some to start, to find its renders and to compile
+FIRST_CONTACT_S = 5.0  # where nothing has ever answered at an address, which is more likely a mistake than a restart
 
 
 class Transport:
     """A server by the address that all its paths begin with. `url` and `key` come from SUNBOX_URL and SUNBOX_API_KEY
-    where they are None; `timeout` is in seconds without a byte. Raises ValueError for what is no address."""
+    where they are None; `timeout` is in seconds without a byte; `patience` is for how many seconds a server is asked
+    again that is full, ends or starts; `asset_root`: folders beside a document's own from which it may name files.
+    Raises ValueError for what is no address."""
 
-    def __init__(self, url: str | None, key: str | None, timeout: float, retries: int) -> None:
+    def __init__(
+        self,
+        url: str | None,
+        key: str | None,
+        timeout: float = TIMEOUT_S,
+        patience: float = PATIENCE_S,
+        asset_root: files.Folders = (),
+    ) -> None:
         self.url = (url or os.environ.get("SUNBOX_URL") or ADDRESS).rstrip("/")
         self.key = key if key is not None else (os.environ.get("SUNBOX_API_KEY") or "").split(",")[0].strip() or None
-        self.timeout, self.retries = timeout, retries
+        self.timeout, self.patience = timeout, patience
+        self._roots = [asset_root] if isinstance(asset_root, str | os.PathLike) else list(asset_root)
         if urlsplit(self.url).scheme not in ("http", "https") or not urlsplit(self.url).netloc:
             raise ValueError(f"url={self.url!r} is not an address such as {ADDRESS}")
         headers = {"authorization": f"Bearer {self.key}"} if self.key else {}
@@ -60,31 +72,30 @@ class Transport:
         """A request that may be sent twice: every one that this package makes. `patient`: its answer may take as long
         as it takes. Raises SunboxError."""
         timeout = httpx2.Timeout(self.timeout, read=None) if patient else httpx2.Timeout(self.timeout)
-        for attempt in range(self.retries + 1):
-            is_last = attempt == self.retries
+        again = self.again()
+        while True:
             try:
                 answer = await self._http.request(
                     method, self.url + path, content=data, headers=headers, timeout=timeout
                 )
             except httpx2.TransportError as error:
-                if is_last or (not self._has_answered and attempt == FIRST_CONTACT):
+                if not await again.after(None if self._has_answered else FIRST_CONTACT_S):
                     raise self._unreachable(error) from None
-                await asyncio.sleep(_pause(attempt))
                 continue
             self._has_answered = True
-            if answer.status_code in AGAIN and not is_last:
-                await asyncio.sleep(_pause(attempt, answer.headers.get("retry-after")))
+            if answer.status_code in AGAIN and await again.after(retry_after=answer.headers.get("retry-after")):
                 continue
             if answer.is_error:
                 raise from_problem(_document(answer.content), answer.status_code)
             return answer
-        raise AssertionError("the last attempt returns or raises")
+
+    def again(self) -> Again:
+        return Again(self.patience)
 
     async def events(self, path: str, last: str) -> AsyncIterator[tuple[str, Any]]:
         """The name and the document of each event up to the one named `last`. An answer that ends before it, because
-        the connection broke or the server is restarted, is asked for again; the count of `retries` begins anew with
-        each event."""
-        attempt = 0
+        the connection broke or the server is restarted, is asked for again; patience begins anew with each event."""
+        again = self.again()
         while True:
             pause = None
             error: SunboxError = Unreachable(f"{self.url} ended the events before the last one.")
@@ -96,7 +107,7 @@ class Transport:
                         if field == "event":
                             name = value
                         elif field == "data":
-                            attempt = 0
+                            again = self.again()
                             yield name, json.loads(value)
                             if name == last:
                                 return
@@ -104,10 +115,8 @@ class Transport:
                 error = self._unreachable(broken)
             except _Busy as busy:
                 error, pause = busy.error, busy.retry_after
-            if attempt >= self.retries:
+            if not await again.after(retry_after=pause):
                 raise error
-            await asyncio.sleep(_pause(attempt, pause))
-            attempt += 1
 
     async def upload(self, data: bytes, name: str) -> str:
         """The id of a file's content, which is sent only where the server does not have it; `name` says how to read
@@ -122,13 +131,13 @@ class Transport:
         """As `upload`. Raises OSError, SunboxError."""
         return await self.upload(await asyncio.to_thread(path.read_bytes), path.name)
 
-    async def uploaded(self, scene: Any) -> files.Scene:
-        """A scene's document for the server: the files that it names by path are there. Raises OSError,
-        SunboxError."""
-        document, folder = files.read_scene(scene)
-        paths = sorted(files.references(document))
-        ids = [await self.upload_file(folder / path) for path in paths]
-        return files.with_ids(document, dict(zip(paths, ids, strict=True)))
+    async def uploaded(self, scene: Any, pointer: str = "/scene") -> files.Scene:
+        """A scene's document for the server: the files that it names by path are there. `pointer`: where it stands in
+        the request. No other way leads from a document to this machine's files. Raises OSError, SunboxError."""
+        document, folder = files.read_scene(scene, pointer)
+        named = sorted(files.references(document).items())
+        paths = {name: files.allowed(name, folder, self._roots, pointer + place) for name, place in named}
+        return files.with_ids(document, {name: await self.upload_file(path) for name, path in paths.items()})
 
     async def _has(self, id: str) -> bool:
         try:
@@ -149,6 +158,27 @@ class Transport:
 
     def _unreachable(self, error: Exception) -> Unreachable:
         return Unreachable(f"No answer came from {self.url}: {error or type(error).__name__}.")
+
+
+class Again:
+    """When a request is sent again, and for how long."""
+
+    def __init__(self, patience_s: float) -> None:
+        self._patience_s, self._attempt = patience_s, 0
+        self._began: float | None = None  # by the loop's clock, with the first failure
+
+    async def after(self, most_s: float | None = None, retry_after: str | None = None) -> bool:
+        """Return True when it is time for another attempt; False where patience is at its end, which comes after
+        `most_s` seconds at the latest. `retry_after`: what the server said."""
+        now = asyncio.get_running_loop().time()
+        self._began = now if self._began is None else self._began
+        left = min(self._patience_s, self._patience_s if most_s is None else most_s) - (now - self._began)
+        if left <= 0:
+            return False
+        pause = max(_pause(self._attempt, retry_after), SHORTEST_PAUSE_S)
+        await asyncio.sleep(min(pause, left))  # the last attempt is made at the end
+        self._attempt += 1
+        return True
 
 
 class _Busy(Exception):

@@ -48,7 +48,7 @@ async def compare(
     transport: Transport, a: Any, b: Any, confidence: float, map: str | None, settings: dict[str, Any]
 ) -> Verdict:
     """Raises OSError, ValueError, TypeError, SunboxError."""
-    body = {name: await _side(transport, side, settings) for name, side in (("a", a), ("b", b))}
+    body = {name: await _side(transport, side, settings, f"/{name}/scene") for name, side in (("a", a), ("b", b))}
     query = "" if map is None else "?" + urlencode({"format": "png", "map": map})
     data = files.text(body | {"confidence": confidence}).encode()
     # The answer comes when the verdict is known, and nothing before it.
@@ -61,7 +61,7 @@ async def compare(
     return Verdict(**known, map=None if map is None else answer.content)
 
 
-async def _side(transport: Transport, side: Any, settings: dict[str, Any]) -> Any:
+async def _side(transport: Transport, side: Any, settings: dict[str, Any], pointer: str) -> Any:
     """A document with its settings, or the id of a picture."""
     if isinstance(id := getattr(side, "id", None), str):
         return id
@@ -72,4 +72,4 @@ async def _side(transport: Transport, side: Any, settings: dict[str, Any]) -> An
     own: dict[str, Any] = {}
     if isinstance(side, dict) and "scene" in side:
         side, own = side["scene"], dict(side.get("settings") or {})
-    return {"scene": await transport.uploaded(side), "settings": own | settings}
+    return {"scene": await transport.uploaded(side, pointer), "settings": own | settings}

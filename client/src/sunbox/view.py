@@ -18,7 +18,7 @@ except ImportError:
 
 from sunbox.client import post, run
 from sunbox.errors import SunboxError
-from sunbox.files import Scene
+from sunbox.files import Folders, Scene
 from sunbox.frames import Frame
 from sunbox.live import LivePicture
 from sunbox.merge import difference, merged
@@ -28,7 +28,6 @@ PRESETS = ("scenes", "materials", "environments")
 SIZE = {"width": 480, "height": 360}
 SAVED_SAMPLES = 16  # that the picture in a saved notebook has, where they come soon
 SAVED_WITHIN_S = 1.0
-TIMEOUT_S, RETRIES = 60.0, 5
 
 
 def _text(name: str) -> str:
@@ -44,17 +43,25 @@ class View(anywidget.AnyWidget):
     material.
 
     `settings` are those of a render: width, height, max_samples, quality and the others. Scenes and frames go through
-    the kernel, so that it alone has to reach the server. Raises SunboxError.
+    the kernel, so that it alone has to reach the server. `asset_root` is as of `Client`. Raises SunboxError.
     """
 
     _esm, _css = _text("widget.js"), _text("widget.css")
     scene = traitlets.Dict()
     material = traitlets.Unicode().tag(sync=True)
 
-    def __init__(self, scene: Any, url: str | None = None, *, key: str | None = None, **settings: Any) -> None:
+    def __init__(
+        self,
+        scene: Any,
+        url: str | None = None,
+        *,
+        key: str | None = None,
+        asset_root: Folders = (),
+        **settings: Any,
+    ) -> None:
         self._is_closed = False
         self._known: Scene | None = None  # a document that is on its way into `scene`, and that the server has
-        self._transport = Transport(url, key, TIMEOUT_S, RETRIES)
+        self._transport = Transport(url, key, asset_root=asset_root)
         self._live = LivePicture(self._transport, scene, self, "jpeg", SIZE | settings)
         self._about = run(self._begun())
         super().__init__()
