@@ -16,7 +16,7 @@ from service.config import Config
 from service.problems import Unavailable
 from service.renders.job import Job
 from service.requests.bodies import SMALL
-from service.routes.submission import pinned
+from service.routes.submission import allowed
 from service.scene.text import most_bytes
 from service.state import AppState
 from service.system.executors import Pool, packing, saving, storing
@@ -146,7 +146,7 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
                 assert await small.answered() == 201
                 id = json.loads(small.body)["id"]
                 assert await Call(app, "b", "GET", f"/v1/assets/{id}", b"").answered() == 200
-                async with pinned(state.storage.quota, [id]):
+                async with allowed(state, "", [("", id)]):
                     pass
             assert not any(each.done() for each in large)
         finally:
