@@ -62,12 +62,8 @@ WITHOUT = {
     "Queued": "a queue.Queue",
     "Written": "a queue.Queue",
     "SceneBvh": "a tree with threads in another sense",
-    "BatchRows": "a transaction of the database for each call",
-    "RenderRows": "a transaction of the database for each call",
-    "CallbackRows": "a transaction of the database for each call",
-    "AssetAccess": "a transaction of the database for each call",
-    "Documents": "a transaction of the database for each call",
-    "Database": "a connection for each call",
+    **dict.fromkeys(("BatchRows", "RenderRows", "CallbackRows", "AssetAccess", "Documents"), "a transaction a call"),
+    "Database": "a connection a call",
     "LostPictures": "the file system's own steps",
     "ParserPool": "its parts have locks",
     "ClientExecutor": "of the event loop; one thread works",
@@ -374,7 +370,10 @@ HAMMERS: dict[str, Callable[[Path], Hammer]] = {
     "system/background.py": _deaths,
     "system/shared_memory.py": _blocks,
 }
-ELSEWHERE = {"Sandbox": "a process for each file: tests/service/assets tests its turns"}
+ELSEWHERE = {
+    "Sandbox": "a process for each file: tests/service/assets tests its turns",
+    "Animator": "one thread writes and one stops it: tests/service/test_contact_sheet.py",
+}
 
 
 @pytest.mark.parametrize("make", dict.fromkeys(HAMMERS.values()), ids=lambda make: make.__name__[1:])

@@ -28,7 +28,8 @@ OTHERS = {
 # says here why not.
 AWAITED = {
     "verdict/comparison.py", "http/downloads.py", "streams/stream.py", "renderers/ray/lane.py", "routes/compare.py",
-    "routes/bsdf.py", "routes/stream.py", "routes/waiting.py", "routes/events.py",
+    "routes/bsdf.py", "routes/batch_files.py", "storage/quota.py", "routes/stream.py", "routes/waiting.py",
+    "routes/events.py",
     "renderers/ray/carriage.py",  # a future that each user of the scene awaits
     "renderers/ray/gateway.py",  # lanes, whose end `_finished` reports; a thread, whose end the hook does
     "commands/documents.py",  # a thread of a command, whose end the hook reports

@@ -331,6 +331,7 @@ def test_callbacks_go_on(tmp_path: Path, dies: Any, monkeypatch: pytest.MonkeyPa
     (due,) = CallbackRows(Database(tmp_path)).listed("", None, 10, None)
 
     async def test() -> None:
+        callbacks._pending[due.owner] = 1
         monkeypatch.setattr(callbacks, "_attempt", broken)
         monkeypatch.setattr(callback_queue, "recording", once_found)
         monkeypatch.setattr(callback_queue, "resolving", nothing)
