@@ -24,6 +24,7 @@ from service.assets.sandbox.wire import adopt, memory, publish
 from service.assets.types import AssetLimits, MeshOddities
 from service.system import child_processes, cpu_time
 from service.system.child_processes import Children
+from service.system.priority import working_niceness
 from tests.asset_files import OBJ, TRIANGLE, exr
 from tests.serving import wait_until
 
@@ -199,7 +200,7 @@ def test_the_child_is_confined(box: Sandbox, monkeypatch: pytest.MonkeyPatch) ->
     assert resource.prlimit(pid, resource.RLIMIT_CPU)[0] < 60
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE):
         assert resource.prlimit(pid, limit)[1] != resource.RLIM_INFINITY
-    assert os.getpriority(os.PRIO_PROCESS, pid) > os.getpriority(os.PRIO_PROCESS, 0)
+    assert os.getpriority(os.PRIO_PROCESS, pid) == working_niceness()
 
 
 @pytest.mark.parametrize("busy", [False, True])
