@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import asyncio
 import gc
 import os
 import sys
@@ -37,6 +38,7 @@ from service.system.executors import Pool
 from service.system.memory import MemoryBudget
 from service.system.turns import CALLER, Turns
 from tests.service.rendering.stored import picture
+from tests.serving import wait_until
 
 SERVICE = Path(__file__).parents[2] / "service"
 THREADS = 8
@@ -306,8 +308,6 @@ def _turns(folder: Path) -> Hammer:
 
 
 def _pool(folder: Path) -> Hammer:
-    import asyncio
-
     pool = Pool("hammered", 2, each=1)
 
     def turn(i: int) -> None:
@@ -320,7 +320,11 @@ def _pool(folder: Path) -> Hammer:
 
         assert await asyncio.gather(*map(one, range(i, i + 6))) == list(range(i, i + 6))
 
-    return turn, lambda: not +pool._running and not pool._busy
+    def over() -> bool:
+        wait_until(lambda: not pool._busy)  # its threads look for more work
+        return not +pool._running
+
+    return turn, over
 
 
 def _garbage(folder: Path) -> Hammer:
@@ -344,11 +348,7 @@ def _blocks(folder: Path) -> Hammer:
         assert found is not None and found[1] == 0
         assert shared_memory.locate(memoryview(b"elsewhere")) is None
 
-    def gone() -> bool:
-        gc.collect()
-        return not shared_memory._blocks or len(os.listdir("/proc/self/fd")) < 500
-
-    return turn, gone
+    return turn, lambda: gc.collect() >= 0 and len(os.listdir("/proc/self/fd")) < 500
 
 
 TURNS = 200  # of each thread
