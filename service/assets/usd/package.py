@@ -22,6 +22,15 @@ from service.assets.types import AssetLimits
 
 INSIDE, OUTSIDE = "inside:", "outside:"  # before the path of a file that is not a layer, in the package or not
 SHADERS = (".mdl", ".osl", ".oso", ".glslfx", ".mtlx")  # code, of which the importer of materials speaks
+DEEPEST = 256  # prims within prims: the library calls itself for each, and 20 000 overflow its stack
+# Braces, and what may hold some that mean nothing: texts, asset paths, comments.
+BRACES = re.compile(
+    rb"""
+    \"{3} (?:\\.|[^\\])*? \"{3} | \" (?:\\.|[^\"\\\n])* \" | '{3} (?:\\.|[^\\])*? '{3} | ' (?:\\.|[^'\\\n])* '
+    | @@@ .*? @@@ | @ [^@\n]* @ | \# [^\n]* | [{}]
+    """,
+    re.DOTALL | re.VERBOSE,
+)
 ALONE = "which is not part of this one; save the scene as a .usdz"
 
 
@@ -104,10 +113,21 @@ def _read(data: bytes | memoryview, name: str) -> Sdf.Layer:
             words = text(bytes(data))
             if not words.startswith(USD_TEXT):
                 raise ParseError("it is no USD layer: it begins neither with #usda nor with PXR-USDC", name)
+            if _depth(words) > DEEPEST:
+                raise ParseError(f"its prims are nested more than {DEEPEST} deep", name)
             layer.ImportFromString(words.decode("utf-8", "replace"))
     except Tf.ErrorException as error:
         raise ParseError(f"the layer cannot be read ({_said(error)})", name) from None
     return layer
+
+
+def _depth(words: bytes) -> int:
+    """How deep the braces of a text layer are nested."""
+    depth = deepest = 0
+    for found in BRACES.finditer(words):
+        depth += {b"{": 1, b"}": -1}.get(found[0], 0)
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def _fill(layer: Sdf.Layer, data: bytes | memoryview) -> None:

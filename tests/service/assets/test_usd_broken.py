@@ -125,3 +125,25 @@ def test_without_the_extra_the_refusal_names_it(monkeypatch: pytest.MonkeyPatch)
     answer = refused("the USD file", caught.value)
     assert isinstance(answer, NotProvided) and "sunbox-server[usd]" in answer.detail
     assert ANSWERS[NotProvided].status == 501
+
+
+@pytest.mark.usd
+def test_prims_are_nested_no_deeper_than_the_library_s_stack(store: AssetStore) -> None:
+    """20 000 of them overflow it."""
+    from service.assets.usd.package import DEEPEST  # needs the library
+
+    def nested(depth: int) -> bytes:
+        return usda('def "a" {\n' * depth + mesh("m") + "\n}" * depth)
+
+    for depth in (DEEPEST, 20_000):  # and one more, the mesh's
+        with pytest.raises(AssetError, match=f"nested more than {DEEPEST} deep"):
+            store.add(nested(depth), filename="a.usda")
+    assert store.add(nested(DEEPEST - 2), filename="a.usda").triangles
+
+
+@pytest.mark.usd
+def test_braces_in_texts_paths_and_comments_are_none() -> None:
+    from service.assets.usd import package  # needs the library
+
+    quoted = [b'"{{"', b"'{{{'", b'"""{\n"{"""', b"'''{{'''", b"@{{@", b"@@@{@{{@@@", b'"\\"{{"']
+    assert package._depth(b"#usda {\n" + b" ".join(quoted) + b" { { } } # {{{\n { }") == 2
