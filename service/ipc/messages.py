@@ -69,6 +69,9 @@ class View:
     prior: bool = False  # until an edited picture has samples, a guess from what it showed before is welcome
 
 
+ESTIMATE = View("estimate", encoding="linear")  # colour (4 channels) and variance (3) of the same samples
+
+
 @dataclass(frozen=True)
 class Progress:
     samples: int = 0

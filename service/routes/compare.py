@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 
 from service import images
 from service.assets.rendered import rendered
-from service.ipc.messages import View
+from service.ipc.messages import ESTIMATE
 from service.pack import Packed
 from service.problems import AssetError, FieldError, InvalidDocument, NotFound, Unavailable
 from service.quality import ResolvedSettings
@@ -43,7 +43,6 @@ VERDICT: answers.Responses = {
     }
 }
 
-COLOR, VARIANCE = View("color", encoding="linear"), View("variance", encoding="linear")
 ASSET = "sha256:"
 HEADER_REGIONS = 16  # in the header beside a map, which proxies bound to 8 KiB
 
@@ -182,11 +181,8 @@ class _Sides:
 
 async def _estimate(job: Job) -> Estimate:
     """Raises Conflict before the first sample, and the render's own error where it failed."""
-    while True:
-        color, progress = await job.image(COLOR)
-        variance, after = await job.image(VARIANCE)
-        if progress.samples == after.samples:  # not so where it goes on
-            return await comparing(partial(Estimate.of, color, variance, progress.samples))
+    pixels, progress = await job.image(ESTIMATE)  # both at once: the render may go on
+    return await comparing(partial(Estimate.of, pixels[..., :4], pixels[..., 4:], progress.samples))
 
 
 def _denoised() -> InvalidDocument:

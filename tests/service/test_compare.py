@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import io
 import json
@@ -13,7 +14,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from service.ipc.messages import Progress, View
+from service.routes.compare import _estimate
+from service.verdict.evidence import Estimate
 from service.verdict.figures import displayed
+from service.worker.view.frames import pixels_of
 from tests.calls import is_problem, metrics, pixels, start, status
 from tests.serving import Server, wait_until
 
@@ -182,6 +187,26 @@ def test_exr_files_are_compared(http: httpx.Client) -> None:
     refused("sha256:" + "0" * 64, 404)
     refused("0" * 32, 404)
     refused("", 404)
+
+
+def test_colour_and_variance_of_a_render_that_goes_on_have_the_same_samples() -> None:
+    """They are read at once: of a quick render two readings might never have the same."""
+
+    class Quick:
+        samples = 0
+
+        async def image(self, view: View) -> tuple[np.ndarray, Progress]:
+            self.samples += 1
+            return pixels_of(self, view, None), Progress(self.samples)  # type: ignore[arg-type]
+
+        def read(self, aov: str) -> np.ndarray:
+            channels = {"color": 4, "variance": 3}[aov]
+            return np.full((2, 3, channels), self.samples + (aov == "variance"), np.float32)
+
+    estimate = asyncio.run(asyncio.wait_for(_estimate(Quick()), 10))  # type: ignore[arg-type]
+    expected = Estimate.of(np.ones((2, 3, 4), np.float32), np.full((2, 3, 3), 2, np.float32), 1)
+    for name, value in vars(expected).items():
+        assert np.array_equal(vars(estimate)[name], value), name
 
 
 @pytest.mark.parametrize("map", ["p", "difference", "flip", "heat"])

@@ -11,7 +11,7 @@ from gpu import COVERAGE_AOVS, FIRST_HIT_AOVS, Lut, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
 from service.displays import view_of
-from service.ipc.messages import Frame, Image, Read, Reason, View, Want
+from service.ipc.messages import ESTIMATE, Frame, Image, Read, Reason, View, Want
 from service.worker.context import WorkerContext
 from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
@@ -261,6 +261,8 @@ class FrameSource:
 def pixels_of(picture: Picture, view: View, clean: Denoised | None, prior: Prior | None = None) -> np.ndarray:
     """The pixels of a picture, (height, width, 4), as the view wants them; with the guess of a `prior`, if any."""
     color = clean.pixels if clean else None
+    if view.aov == ESTIMATE.aov:
+        return np.concatenate([picture.read("color"), picture.read("variance")], axis=-1)
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
     lut = Lut(view.lut.key, view.lut.values, view.lut.low, view.lut.high) if view.lut else None
