@@ -235,9 +235,11 @@ class _Server(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        if (reason := await self._state.gpu_missing()) is not None:
+        reason = await self._state.sandbox_missing() or await self._state.gpu_missing()
+        if reason is not None:
             log.error("did not start", {"reason": reason})
             await self._state.renderers.close()
+            await asyncio.to_thread(self._state.storage.assets.close)
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)

@@ -137,6 +137,9 @@ class Config(BaseSettings):
         None, ge=1, description="Renderers in the Ray cluster (default: one a GPU, without GPUs one a node)."
     )
     require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
+    require_sandbox: bool = Field(
+        False, description="Refuse to start where the kernel does not confine what parses (Landlock, seccomp)."
+    )
     log_format: Literal["console", "json"] = Field(
         "console", description="`console` for people, or `json`: one object a line."
     )

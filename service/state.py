@@ -172,6 +172,15 @@ class AppState:
             return f"SUNBOX_REQUIRE_GPU is set, and there is no renderer: {error.detail}"
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None
 
+    async def sandbox_missing(self) -> str | None:
+        """The reason why SUNBOX_REQUIRE_SANDBOX forbids to start, or None. Waits for a first process that parses."""
+        if not self.config.require_sandbox:
+            return None
+        missing = (await asyncio.to_thread(self.storage.assets.rights)).missing
+        if not missing:
+            return None
+        return f"SUNBOX_REQUIRE_SANDBOX is set, and the processes that parse are not confined: {', '.join(missing)}"
+
     async def farewell(self) -> None:
         """Tell all clients that the server ends, and answer open requests; renders go on at the next start."""
         if self.warming is not None:

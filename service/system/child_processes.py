@@ -56,7 +56,7 @@ class Child:
     Its first message says which rights it has given up. `is_spent` is set where it should get no more work.
     """
 
-    def __init__(self, module: str, environment: dict[str, str], is_quiet: bool) -> None:
+    def __init__(self, module: str, environment: dict[str, str]) -> None:
         self.link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         line, self._lifeline = os.pipe()
         try:
@@ -67,7 +67,7 @@ class Child:
                 pass_fds=[theirs.fileno(), line],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL if is_quiet else None,
+                stderr=subprocess.DEVNULL,  # the server's is its log, of which nobody else writes lines
             )
         except BaseException:
             os.close(self._lifeline)
@@ -110,14 +110,12 @@ class Child:
 class Children:
     """Children of one module, for any thread. They start on demand, and each serves many requests in turn."""
 
-    def __init__(
-        self, module: str, most: int, environment: dict[str, str] | None = None, is_quiet: bool = False
-    ) -> None:
-        """`environment` is added to each child's; `is_quiet` throws away what its libraries print to stderr.
+    def __init__(self, module: str, most: int, environment: dict[str, str] | None = None) -> None:
+        """`environment` is added to each child's.
 
         A child gets work `most` times: what one piece of it may have done to its memory does not stay for ever.
         """
-        self._module, self._most, self._environment, self._is_quiet = module, most, environment or {}, is_quiet
+        self._module, self._most, self._environment = module, most, environment or {}
         self._lock = threading.Lock()
         self._idle: list[Child] = []
         self._is_closed = False
@@ -169,7 +167,7 @@ class Children:
         return self._start()
 
     def _start(self) -> Child:
-        return Child(self._module, self._environment, self._is_quiet)
+        return Child(self._module, self._environment)
 
     def _give_back(self, child: Child) -> None:
         with self._lock:

@@ -5,6 +5,7 @@ Where the kernel of this machine lacks Landlock or seccomp, the tests of these a
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import json
 import os
@@ -17,8 +18,11 @@ from typing import Any
 
 import pytest
 
+from service.app import create_app
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.types import AssetLimits
+from service.config import Config
+from service.state import AppState
 from service.system.child_processes import ROOT, Children, inherited_environment
 from service.system.confined import Rights, rights, seccomp
 from service.system.confined.landlock import RIGHTS
@@ -231,6 +235,26 @@ def test_what_the_kernel_lacks_is_said_once(
     assert not Rights(True, True, False, True, 1, True).missing  # without sockets no network is needed
     (record,) = caplog.records
     assert record.levelname == "WARNING" and "landlock,seccomp" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "given_up", [Rights(), Rights(True, True, True, True, 0, True), Rights(True, True, False, True, 1, True)]
+)
+def test_a_server_may_ask_for_all_of_it(given_up: Rights, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`SUNBOX_REQUIRE_SANDBOX`: where the kernel does not take something, the start ends with its name."""
+    monkeypatch.setattr(Children, "rights", lambda self: given_up)
+
+    def reason(require_sandbox: bool) -> str | None:
+        state: AppState = create_app(Config(data_dir=tmp_path, require_sandbox=require_sandbox)).state.sunbox
+        try:
+            return asyncio.run(state.sandbox_missing())
+        finally:
+            state.storage.assets.close()
+
+    assert reason(False) is None
+    told = reason(True)
+    assert (told is None) == (not given_up.missing)
+    assert told is None or all(name in told for name in ("SUNBOX_REQUIRE_SANDBOX", *given_up.missing))
 
 
 def test_the_server_says_it_and_is_hidden(server: Server) -> None:

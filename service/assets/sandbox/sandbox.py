@@ -82,7 +82,7 @@ class Sandbox:
         self._turns = Turns(limits.children)
         self._asking = threading.Lock()
         self._rights: Rights | None = None
-        self.children = Children("service.assets.sandbox.child", FILES, ENVIRONMENT, is_quiet=True)
+        self.children = Children("service.assets.sandbox.child", FILES, ENVIRONMENT)
 
     def start(self) -> None:
         """Start a child for the first file, without waiting."""

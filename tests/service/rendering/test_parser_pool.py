@@ -77,7 +77,7 @@ def time_of(pid: int) -> float:
 def test_a_message_that_comes_during_work_ends_no_child() -> None:
     """The kernel's notice of a message may come when the message has been read. As a signal it ended the child: of
     30 files that 12 processes read at a time, one "crashed the parser"."""
-    child = Child("service.requests.parser_child", {}, False)
+    child = Child("service.requests.parser_child", {})
     large = {**MESH, "vertices": ROWS * 100}
     body = written({**REQUEST, "scene": {**SCENE, "shapes": [*SCENE["shapes"], large]}})
     work = parser_pool.Work("request", body, config(), 512 * MIB, 60.0)
@@ -130,10 +130,12 @@ def test_the_process_has_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its environment is taken where it is given: from outside it cannot be read."""
     monkeypatch.setenv("SUNBOX_API_KEY", "secret")
     given: list[dict[str, str]] = []
+    streams = set[Any]()
     start = subprocess.Popen
 
     def started(*arguments: Any, env: dict[str, str], **more: Any) -> Any:
         given.append(env)
+        streams.update(more[name] for name in ("stdin", "stdout", "stderr"))
         return start(*arguments, env=env, **more)
 
     monkeypatch.setattr(subprocess, "Popen", started)
@@ -141,6 +143,7 @@ def test_the_process_has_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
     pool.parse("request", written(REQUEST))
     pool.close()
     assert given and "PATH" in given[0]
+    assert streams == {subprocess.DEVNULL}, "one that was taken over could write lines of the server's log"
     assert not any(name.startswith("SUNBOX_") or "secret" in value for name, value in given[0].items())
 
 
