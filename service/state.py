@@ -85,8 +85,8 @@ class AppState:
         self.batches = BatchQueue(self.render_queue, self._members, self._ended, self.config.max_running + 1)
         self.callbacks = Callbacks(self.config, self._told_of)
         self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
-        self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
-        self.downloads = Downloads(self.config.data_dir)
+        self.downloads = Downloads(self.config.data_dir, self.memory)
+        self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu, self.downloads)
         self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients, self.config.max_key_clients)
 
     async def info(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Large answers: sent in pieces, as the client takes them, from files and not from memory.
+"""Large answers: sent in pieces, as the client takes them, from files and not from memory, but for small ones.
 
 Pictures are encoded one at a time for each caller, so that a caller that requests many delays only itself.
 """
@@ -21,9 +21,12 @@ from typing import BinaryIO
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.problems import Unavailable
+from service.problems import TooLarge, Unavailable
+from service.system.disk_usage import FULL, trouble
+from service.system.memory import Holder, MemoryBudget
 from service.system.shares import Shares
 
+SMALL = 1 << 20  # bytes of an answer that is made in memory, and needs no disk
 PIECE = 1 << 18  # bytes that are read and sent at a time
 AT_ONCE = 2  # pictures that are fetched from the renderer and encoded at the same time
 LASTING = 16  # files that stay when they were sent
@@ -95,23 +98,24 @@ async def disconnected(receive: Receive) -> None:
 
 
 class Written:
-    """A picture's file. It has no name, and is deleted with the last reference to this object."""
+    """A picture's file, on the disk or in memory. It has no name, and is deleted with the last reference to this
+    object, as its memory is released with that to `held`."""
 
-    def __init__(self, file: BinaryIO) -> None:
-        self.file = file
+    def __init__(self, file: BinaryIO, held: object = None) -> None:
+        self.file, self._held = file, held
         self.bytes = os.fstat(file.fileno()).st_size
 
     @property
     def is_modest(self) -> bool:
         """Whether as many as stay would leave room for others."""
-        return self.bytes <= ROOM // (2 * LASTING)
+        return self.bytes <= (SMALL if self._held is not None else ROOM // (2 * LASTING))
 
 
 class Downloads:
     """Pictures that are written and sent, for the event loop."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, memory: MemoryBudget | None = None) -> None:
+        self._folder, self._memory = folder, memory or MemoryBudget()
         self._room = asyncio.Semaphore(AT_ONCE)
         self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
         self._lasting = OrderedDict[Hashable, Written]()  # the last ones that took long to make
@@ -136,7 +140,7 @@ class Downloads:
             file.write(data)
 
         self.admit(caller, len(data))
-        written = await asyncio.to_thread(self.write, fill)
+        written = await asyncio.to_thread(self.write, fill, len(data))
         self.keep(caller, None, written)
         return FileAnswer(written.file, media_type, headers or {}, written)
 
@@ -157,16 +161,40 @@ class Downloads:
         with self._shares.taken(caller, min(most_bytes, ROOM // 4)):
             yield
 
-    def write(self, fill: Callable[[BinaryIO], None]) -> Written:
-        """A file that `fill` has written. For any thread. Raises Unavailable where the disk is full."""
+    def write(self, fill: Callable[[BinaryIO], object], most_bytes: int) -> Written:
+        """A file that `fill` has written, of about `most_bytes`. For any thread. A small one is in memory, as is one
+        for which the disk has no room; `fill` is then called again. Raises Unavailable where neither has room."""
+        if most_bytes <= SMALL:
+            with suppress(Unavailable, TooLarge, OSError):
+                return self._in_memory(fill, most_bytes)
         try:
             file = self._new_file()
             fill(file)
             file.flush()
+            return Written(file)
         except OSError as error:
-            log.error("could not write an answer", {"error": error})
-            raise Unavailable("The answer could not be written to the disk.", RETRY_S) from None
-        return Written(file)
+            log.error("could not write an answer to the disk", {"error": error})
+            reason = trouble(error, self._folder)
+            detail = f"The answer could not be written: {reason}"
+            if error.errno is None and reason != FULL:  # what writes it failed, and not the disk
+                raise Unavailable(f"{detail}.", RETRY_S) from None
+        try:
+            return self._in_memory(fill, most_bytes)
+        except (Unavailable, TooLarge):
+            raise Unavailable(f"{detail}, and there is no memory for it (SUNBOX_MEMORY).", RETRY_S) from None
+        except OSError:
+            raise Unavailable(f"{detail}.", RETRY_S) from None
+
+    def _in_memory(self, fill: Callable[[BinaryIO], object], most_bytes: int) -> Written:
+        """Raises Unavailable, TooLarge where the memory of all callers has no room."""
+        holder = Holder()
+        self._memory.hold("pictures", holder, most_bytes)
+        file = os.fdopen(os.memfd_create("answer"), "w+b")
+        fill(file)
+        file.flush()
+        written = Written(file, holder)
+        self._memory.hold("pictures", holder, written.bytes)
+        return written
 
     def _new_file(self) -> BinaryIO:
         """A file without a name beside the data, or a temporary one where the data is read-only."""
@@ -181,7 +209,7 @@ class Downloads:
     def keep(self, caller: str, key: Hashable | None, written: Written, lasting: bool = False) -> None:
         """Count a picture while it is being sent; with `key`, `find` leads other requests to it. One that took long
         to make is `lasting`: it stays for later requests, too, until others of that kind took its place."""
-        if lasting:
+        if lasting and written.is_modest:
             self._lasting[key] = written
             while len(self._lasting) > LASTING:
                 self._lasting.popitem(last=False)

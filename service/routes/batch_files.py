@@ -134,7 +134,7 @@ async def sheet(
             images.write(file, np.asarray(drawn), format)
 
         with state.memory.held("pictures", SHEET_PIXEL_BYTES * pixels):
-            return await writing(partial(state.downloads.write, write))
+            return await writing(partial(state.downloads.write, write, 3 * pixels))
 
     made = _Made(("sheet", format, width, view), steps, cell, images.FORMATS[format].mime, 3 * pixels)
     return await _answered(request, batch, made, make)
@@ -170,7 +170,7 @@ async def animated(
         animator = Animator(pictures.path, cell, len(steps), format, fps)
         with state.memory.held("pictures", most_memory(cell, len(steps))):
             try:
-                return await filming(partial(state.downloads.write, animator.write))
+                return await filming(partial(state.downloads.write, animator.write, most_bytes))
             finally:
                 animator.stop()
 

@@ -56,7 +56,7 @@ async def written(
                 file.write(piece)
 
         state.downloads.admit(caller, exported.size)
-        file = await packing(partial(state.downloads.write, fill), caller)
+        file = await packing(partial(state.downloads.write, fill, exported.size), caller)
     state.downloads.keep(caller, None, file)
     headers = {
         "content-disposition": f'attachment; filename="scene.{ending}"',

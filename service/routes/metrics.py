@@ -13,6 +13,7 @@ from service.problems import Unavailable
 from service.renderers.protocol import Member
 from service.renderers.statistics import ClientStatistics, Distribution, Statistics
 from service.system.background import deaths
+from service.system.disk_usage import free
 from service.system.executors import measuring
 
 if TYPE_CHECKING:
@@ -165,6 +166,7 @@ def _disk(state: AppState) -> Iterator[Metric]:
         yield _gauge("data_bytes", "Assets, documents and renders on the disk, in whole blocks.", stored.bytes)
         yield _gauge("data_files", "Files of assets, documents and renders.", stored.files)
     yield _gauge("data_quota_bytes", "What they may take.", state.config.data_quota)
+    yield _gauge("disk_free_bytes", "Bytes that are left on the data folder's disk.", free(state.config.data_dir))
 
 
 # prometheus_client is imported where it is used, so that a server starts without it.

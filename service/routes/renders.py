@@ -297,7 +297,7 @@ async def picture_file(
             downloads.admit(caller, _most_bytes(job, query))
             with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
                 written = await _written(downloads, job, query, await lut_of(request, query.lut))
-            downloads.keep(caller, key, written, lasting=key is not None and query.aov == "all" and written.is_modest)
+            downloads.keep(caller, key, written, lasting=key is not None and query.aov == "all")
     return written
 
 
@@ -320,7 +320,8 @@ async def _written(downloads: Downloads, job: Job, query: ImageQuery, lut: messa
     for covered in CRYPTOMATTE_LAYERS if query.cryptomatte else ():
         layers[covered], _ = await job.image(replace(view, aov=covered))
     document = await job.document()
-    return await writing(lambda: downloads.write(partial(_write, layers, query, job, document, samples)))
+    fill = partial(_write, layers, query, job, document, samples)
+    return await writing(partial(downloads.write, fill, _most_bytes(job, query)))
 
 
 def _aovs(query: ImageQuery) -> list[Aov]:
@@ -356,9 +357,10 @@ def _write(
         )
         made_from = recipe.write_text(unfolded(document), job.order.settings, samples, view)
     if query.cryptomatte:
-        coverage = {aov: layers.pop(aov) for aov in CRYPTOMATTE_LAYERS}
+        coverage = {aov: layers[aov] for aov in CRYPTOMATTE_LAYERS}
+        others = {aov: layer for aov, layer in layers.items() if aov not in coverage}
         matte = Cryptomatte(coverage, names_of(load_json(unfolded(document))))
-        images.write_layers(file, layers, made_from, matte)
+        images.write_layers(file, others, made_from, matte)
     elif query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:

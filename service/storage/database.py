@@ -10,7 +10,7 @@ from pathlib import Path
 
 from service.problems import Unavailable
 from service.storage.migrations import MIGRATIONS, VERSION
-from service.system.disk_usage import Usage
+from service.system.disk_usage import FULL, Usage, trouble
 
 log = logging.getLogger(__name__)
 
@@ -88,7 +88,9 @@ class Database:
             log.error("could not reach the database", {"file": self.path, "error": error})
             if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_BUSY:
                 raise Unavailable("Others are writing to the database just now.", 1) from None
-            raise Unavailable("The database cannot be reached: the server's disk has a problem.", 30) from None
+            is_full = getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_FULL
+            detail = FULL if is_full else trouble(error, self.path.parent)
+            raise Unavailable(f"The database cannot be reached: {detail}.", 30) from None
 
     def usage(self) -> Usage:
         """Bytes of the file's used pages, without the log beside it, which is deleted when the file is closed."""

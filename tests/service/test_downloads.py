@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import os
 import socket
 import tempfile
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
@@ -16,8 +18,9 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from service.http import downloads
-from service.http.downloads import PIECE, Downloads, FileAnswer, Pieces
+from service.http.downloads import PIECE, SMALL, Downloads, FileAnswer, Pieces
 from service.problems import TooManyRequests, Unavailable
+from service.system.memory import MemoryBudget
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, SCENE, Server, wait_until
 
@@ -115,14 +118,14 @@ def test_there_is_room_for_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     async def test() -> None:
         room = Downloads(tmp_path)
-        one = room.write(lambda file: file.write(b"x" * 400) and None)
+        one = room.write(lambda file: file.write(b"x" * 400), 400)
         room.admit("many", 5000)  # whatever its size, one goes
         room.keep("many", "key", one)
         assert room.find("key") is one and not list(tmp_path.iterdir())
         with pytest.raises(TooManyRequests):
             room.admit("many", 101)
         room.admit("few", 600)
-        two = room.write(lambda file: file.write(b"x" * 600) and None)
+        two = room.write(lambda file: file.write(b"x" * 600), 600)
         room.keep("few", None, two)
         with pytest.raises(Unavailable):
             room.admit("third", 1)
@@ -137,12 +140,48 @@ def test_there_is_room_for_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     asyncio.run(test())
 
 
-def test_a_full_disk(tmp_path: Path) -> None:
-    def fill(file: BinaryIO) -> None:
-        raise OSError(28, "No space left on device")
+class FullDisk(Downloads):
+    """Files are made on the disk, and none has room for a byte."""
 
-    with pytest.raises(Unavailable):
-        Downloads(tmp_path).write(fill)
+    tried = 0
+
+    def _new_file(self) -> BinaryIO:
+        self.tried += 1
+        return open("/dev/full", "wb")
+
+
+@pytest.mark.parametrize("size", [1, SMALL, SMALL + 1, 8 * SMALL])
+def test_on_a_full_disk_answers_come_from_memory(tmp_path: Path, size: int) -> None:
+    """Small ones always do. Their memory counts until the last reference."""
+    memory = MemoryBudget(10 * SMALL)
+    room, data = FullDisk(tmp_path, memory), np.random.default_rng(size).bytes(size)
+    written = room.write(lambda file: file.write(data), size)
+    assert os.pread(written.file.fileno(), size + 1, 0) == data and written.bytes == size
+    assert memory.used()["pictures"] == size and room.tried == (size > SMALL)
+    del written
+    gc.collect()
+    assert memory.used()["pictures"] == 0
+
+
+@pytest.mark.parametrize("size", [1, 8 * SMALL])
+def test_without_disk_and_memory_the_reason_is_named(tmp_path: Path, size: int) -> None:
+    with pytest.raises(Unavailable, match=r"the server's disk is full.*SUNBOX_MEMORY"):
+        FullDisk(tmp_path, MemoryBudget(0)).write(lambda file: file.write(bytes(size)), size)
+    written = Downloads(tmp_path, MemoryBudget(0)).write(lambda file: file.write(bytes(size)), size)
+    assert written.bytes == size, "with one of the two there is room"
+
+
+def test_a_large_answer_in_memory_does_not_stay(tmp_path: Path) -> None:
+    async def test() -> None:
+        memory = MemoryBudget(10 * SMALL)
+        for room, size in ((FullDisk(tmp_path, memory), SMALL), (FullDisk(tmp_path, memory), 2 * SMALL)):
+            written = room.write(partial(lambda size, file: file.write(bytes(size)), size), size)
+            room.keep("a", "key", written, lasting=True)
+            del written
+            gc.collect()
+            assert (room.find("key") is not None) == (size == SMALL)
+
+    asyncio.run(test())
 
 
 def resident(server: Server) -> int:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Any, cast
+from pathlib import Path
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 import pytest
 
 from service.assets import Assets
 from service.config import Config
+from service.http.downloads import Downloads
 from service.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
 from service.operation import readiness
 from service.operation.readiness import Readiness
@@ -20,6 +22,7 @@ from service.renderers.first_frame import foresee, warm_up
 from service.renderers.protocol import Listener
 from service.renderers.statistics import Kind, Statistics
 from service.requests.request_reader import RequestReader
+from service.system.memory import MemoryBudget
 
 READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
 
@@ -79,9 +82,11 @@ def is_lost(listener: Listener, task: int) -> None:
 def is_silent(listener: Listener, task: int) -> None: ...
 
 
-def checked(renderers: StandIn, times: int = 1, require_gpu: bool = False) -> None:
+def checked(
+    renderers: StandIn, times: int = 1, require_gpu: bool = False, downloads: Downloads | None = None
+) -> None:
     async def run() -> None:
-        tested = Readiness(renderers, READER, require_gpu)
+        tested = Readiness(renderers, READER, require_gpu, downloads)
         for _ in range(times):
             await tested.check()
 
@@ -111,6 +116,19 @@ def test_a_bad_renderer_is_not_ready(
     with pytest.raises(Unavailable, match=reason):
         checked(renderers)
     assert not renderers.open_tasks, "nothing stays behind"
+
+
+def test_a_server_that_can_answer_no_picture_is_not_ready(tmp_path: Path) -> None:
+    """One whose disk is full can, as long as there is memory."""
+
+    class FullDisk(Downloads):
+        def _new_file(self) -> BinaryIO:
+            return open("/dev/full", "wb")
+
+    checked(StandIn(grey(0.5)), downloads=FullDisk(tmp_path))
+    checked(StandIn(grey(0.5)), downloads=Downloads(tmp_path, MemoryBudget(0)))
+    with pytest.raises(Unavailable, match="disk is full"):
+        checked(StandIn(grey(0.5)), downloads=FullDisk(tmp_path, MemoryBudget(0)))
 
 
 def test_a_software_renderer_is_not_ready_where_a_gpu_is_required() -> None:

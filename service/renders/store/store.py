@@ -29,7 +29,7 @@ from service.requests.request_parser import patched
 from service.storage.asset_access import AllowedUses
 from service.storage.database import Database
 from service.storage.stores import RENDERS
-from service.system.disk_usage import Usage, expected
+from service.system.disk_usage import Usage, expected, trouble
 from service.system.executors import (
     Pool,
     packing,
@@ -249,9 +249,7 @@ class RenderStore:
             raise
         except OSError as error:
             log.error("could not reach a stored picture", {"error": error})
-            raise Unavailable(
-                "The picture can't be stored: the server's disk is full or has a problem.", RETRY_S
-            ) from None
+            raise Unavailable(f"The picture can't be stored: {trouble(error, self._folder)}.", RETRY_S) from None
 
 
 def _pool(size: int) -> Pool:
