@@ -1,8 +1,10 @@
 # syntax=docker/dockerfile:1
 # Sunbox on an NVIDIA GPU where the container is given one, else on the processor through Mesa's llvmpipe.
 #   docker build -t sunbox .
-#   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data sunbox
-#   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
+#   docker run --rm --init --read-only --cap-drop ALL --security-opt no-new-privileges \
+#     -p 127.0.0.1:8000:8000 -v sunbox:/data sunbox
+#   docker run --rm --init --read-only --cap-drop ALL --security-opt no-new-privileges \
+#     -p 127.0.0.1:8000:8000 -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
 # With Ray, for the nodes of a cluster (docs/scaling.md):
 #   docker build --build-arg LOCK=ray -t sunbox-ray .
 # With USD files: docker build --build-arg LOCK=usd -t sunbox-usd .

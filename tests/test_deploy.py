@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Any
 
@@ -96,13 +97,19 @@ def test_no_example_has_a_key_on_a_command_line() -> None:
 
 
 def test_the_proxy_of_compose_is_trusted() -> None:
-    """So that it has no share of its own, and its callers are told apart."""
+    """So that it has no share of its own, and its callers are told apart. Nobody else is: its address is one that
+    Docker gives to no other container, nor to the host."""
     (compose,) = documents(ROOT / "compose.yaml")
+    (range,) = compose["networks"]["default"]["ipam"]["config"]
+    proxy = compose["services"]["proxy"]["networks"]["default"]["ipv4_address"]
+    network, given_out = ip_network(range["subnet"]), ip_network(range["ip_range"])
+    assert ip_address(proxy) in network and ip_address(proxy) not in given_out and given_out.subnet_of(network)
+    assert ip_address(proxy) != network[1], "the host's"
     for name in ("sunbox", "sunbox-gpu", "head"):
         service = compose["services"][name]
         given = {key.removeprefix("SUNBOX_").lower(): value for key, value in service["environment"].items()}
         config = load_config(trusted_proxies=given["trusted_proxies"], max_connections=given["max_connections"])
-        assert "ports" not in service and "172.16.0.0/12" in config.trusted_proxies
+        assert "ports" not in service and config.trusted_proxies == [f"{proxy}/32"]
         assert config.max_connections > Config.model_fields["max_connections"].default
 
 
