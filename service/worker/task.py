@@ -115,7 +115,7 @@ class Task:
 
     def turn(self) -> None:
         """Do the next step of the picture."""
-        self.picture.step(self._paused)
+        self.picture.step(self._paused, settles=bool(self._later))
 
     def answer(self) -> bool:
         """Send the frame that is wanted, if it would show something new."""

@@ -91,9 +91,10 @@ class TaskPicture:
         """Whether the next step may take as long as a compilation does."""
         return self.phase in (Phase.COMPILING, Phase.UPDATING)
 
-    def step(self, paused: bool) -> None:
+    def step(self, paused: bool, settles: bool = False) -> None:
         """Apply updates, trace a slice, and end the render when that was the last. While `paused`, only a first look
-        at what is new is traced."""
+        at what is new is traced. With `settles` an update is applied and nothing traced: messages wait behind it, such
+        as the picture to go on with."""
         pending = self.updates.pending
         if self.phase is Phase.COMPILING:
             self.traced += self.updates.preview.step()
@@ -103,6 +104,8 @@ class TaskPicture:
             if self.updates.begin_to_wait(pending, paused):
                 return
             self._apply(pending)
+            if settles:
+                return
         if self.updates.stops:
             self.stop()
         residency = self.residency

@@ -190,7 +190,7 @@ ROUTES: dict[str, tuple[list[list[Any]], set[str]]] = {
     "a stream": (
         [
             [
-                Update(FIRST, 1, arrays_of("plain"), SIZE, StopRule(8), interactive=True),
+                Update(FIRST, 1, arrays_of("plain"), SIZE, StopRule(4096), interactive=True),
                 Want(FIRST, 1, View(prior=True)),
             ]
         ],
