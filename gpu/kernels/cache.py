@@ -120,6 +120,7 @@ class KernelCache:
         return kernel
 
     def release(self) -> None:
+        contexts.use(self._context)  # another one has programs of the same numbers
         for kept in self._cache.values():
             kept.kernel.release()
         self._cache.clear()

@@ -229,10 +229,10 @@ def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
 
 
 def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    budget = MemoryBudget(4 * MIB)
+    budget = MemoryBudget(13 * MIB // 2)  # both texts, and the values of one
     bodies = Bodies(Config(), budget)
 
-    text = b'{"material": {"type": "diffuse"}, "to": "openpbr"}'.ljust(2 * MIB)
+    text = b'{"material": {"type": "diffuse", "albedo": 0.5}, "to": "openpbr"}'.ljust(2 * MIB)
 
     async def receive() -> dict[str, Any]:
         return {"type": "http.request", "body": text, "more_body": False}
