@@ -93,8 +93,8 @@ class TaskPicture:
 
     def step(self, paused: bool, settles: bool = False) -> None:
         """Apply updates, trace a slice, and end the render when that was the last. While `paused`, only a first look
-        at what is new is traced. With `settles` an update is applied and nothing traced: messages wait behind it, such
-        as the picture to go on with."""
+        at what is new is traced. With `settles` an update is applied and nothing traced, as messages wait behind it,
+        such as the picture to go on with."""
         pending = self.updates.pending
         if self.phase is Phase.COMPILING:
             self.traced += self.updates.preview.step()
