@@ -3,12 +3,11 @@
 
 SPOOL has the pictures, as `Frames` reads them. INTO is the descriptor of the file that is written, MEMORY how many
 bytes the process may take beside what it has. Its standard input is a pipe whose other end the server holds: it ends
-with the server.
+with the server, and is as nice as the thread that starts it.
 """
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import get_args
@@ -18,7 +17,6 @@ from service.images.animation import AnimationFormat, Frames
 from service.system.confined import bound
 from service.system.lifeline import end_with_pipe
 
-NICENESS = 12  # as threads that write large pictures to files while every stream goes on
 SECONDS = 24 * 3600.0  # of processor time: the server ends it when nobody waits for it any more
 
 
@@ -26,7 +24,6 @@ def main() -> int:
     spool, width, height, format, fps, into, memory = sys.argv[1:]
     if not end_with_pipe(0):
         return 1
-    os.nice(NICENESS)
     formats: dict[str, AnimationFormat] = {each: each for each in get_args(AnimationFormat)}
     frames = Frames(Path(spool), (int(width), int(height)))
     if format != "mp4":  # ffmpeg's threads would count as well

@@ -38,6 +38,7 @@ done.set()
 thread.join()
 print(*found, os.getpriority(os.PRIO_PROCESS, 0))
 """
+SERVICE = Path(__file__).parents[3] / "service"
 # In the commands of processes; the last one is there where a kernel was new.
 WORKERS = ("service.worker\0", "service.requests.parser_child", "service.assets.sandbox.child", "--priority\0now")
 PACKS = """
@@ -71,6 +72,24 @@ def niceness(pid: int) -> int:
     """The least of a process's threads: drivers have some that give way further."""
     threads = Path(f"/proc/{pid}/task").iterdir()
     return min(os.getpriority(os.PRIO_PROCESS, int(thread.name)) for thread in threads)
+
+
+def test_nothing_else_gives_way() -> None:
+    """Whoever sets a niceness takes that of SUNBOX_NICE, or has a reason here to give way further."""
+    calls = ("os.nice(", "raise_thread_niceness(", "raise_process_niceness(", "setpriority(", "sched_setscheduler(")
+    found = {path.relative_to(SERVICE).as_posix() for path in SERVICE.glob("**/*.py") if any_of(calls, path)}
+    assert found == {
+        "system/priority.py",
+        "system/executors.py",
+        "system/confined/limits.py",
+        "worker/__main__.py",
+        "worker/helpers/compile_main.py",  # what is compiled ahead
+        "worker/helpers/denoise_main.py",  # for which no first frame waits
+    }
+
+
+def any_of(words: tuple[str, ...], path: Path) -> bool:
+    return any(word in path.read_text("utf-8") for word in words)
 
 
 def test_what_works_for_somebody_gives_way_by_the_steps_that_are_set(server: Server) -> None:
