@@ -132,6 +132,7 @@ def test_a_refusal_is_logged_once_and_ends_nothing(
     def refuse(*_: int) -> None:
         raise PermissionError(1, "Operation not permitted")
 
+    monkeypatch.setattr(os, "getpriority", lambda *_: 0)  # who starts the tests at 19 asks for nothing
     monkeypatch.setattr(os, "setpriority", refuse)
     priority._log_refusal.cache_clear()
     with caplog.at_level(logging.WARNING):
