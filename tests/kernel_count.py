@@ -19,7 +19,7 @@ import pytest
 from tests.families import EXACT
 
 ENTRIES = ("pathtrace.comp", "lighttrace.comp", "guides.comp")
-MOST = 360  # with those of servers; 60 are the aim, 255 and the browser's servers were counted
+MOST = 420  # 60 are the aim; 255 of the main part were counted, and 91 to 124 of the browser's servers
 # A line of a server's log, on a terminal or as JSON.
 COMPILED = re.compile(r"compiled (?:pathtrace|lighttrace|guides)\.comp\b.*?\bkey[\"']?[=:] ?[\"']?([0-9a-f]{12})")
 VARIABLE = "SUNBOX_TEST_KERNELS"  # the file in which all processes of a run write down what they compiled

@@ -73,7 +73,7 @@ def test_an_open_file_is_as_good_as_bytes(box: Sandbox, tmp_path: Path) -> None:
 def test_one_child_serves_many_files(box: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     """Until it has seen enough of them, or one that was wrong and may have been an attempt."""
     monkeypatch.setattr(sandbox, "FILES", 3)
-    box.children = Children("service.assets.sandbox.child", sandbox.FILES, sandbox.ENVIRONMENT, is_quiet=True)
+    box.children = Children("service.assets.sandbox.child", sandbox.FILES, sandbox.ENVIRONMENT)
     pid = pid_of(box)
     assert pid_of(box) == pid
     third = pid_of(box)
