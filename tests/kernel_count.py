@@ -73,7 +73,12 @@ def start(config: pytest.Config) -> KernelCount:
         handle, name = tempfile.mkstemp(prefix="sunbox-kernels-")
         os.close(handle)
         os.environ[VARIABLE] = name
-        config.add_cleanup(lambda: (os.environ.pop(VARIABLE), Path(name).unlink()))
+
+        def forget() -> None:
+            del os.environ[VARIABLE]
+            os.unlink(name)
+
+        config.add_cleanup(forget)
     # With exact kernels, and in what `make long-test` alone runs, there is one for nearly every scene.
     bounded = not EXACT and "not slow" in config.option.markexpr
     _count = KernelCount(Path(os.environ[VARIABLE]), bounded)
