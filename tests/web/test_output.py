@@ -246,7 +246,7 @@ def test_a_noisy_picture_is_saved_now_or_when_it_is_clean(blank: Editor, server:
     assert re.fullmatch(r"Sphere-on-a-floor-\d+x\d+-\d+.png", waiting.value.suggested_filename)
     few = samples_of(waiting.value)  # two, or more where there were more by then
     write_samples(100_000)
-    editor.wait("samples", lambda: editor.text("#state") == "Converging")
+    editor.wait("a picture that is not done", lambda: editor.samples() > few)
     page.keyboard.press("p")
     with page.expect_download() as waiting:
         asked.get_by_role("button", name="When clean").click()
