@@ -21,7 +21,8 @@ from importlib import metadata
 from pathlib import Path
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
+from starlette.requests import HTTPConnection
 from starlette.responses import FileResponse, Response
 
 from service import presets
@@ -58,11 +59,11 @@ from service.routes import (
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import Files, respond, tell_errors
-from service.state import MESSAGE_BYTES, AppState
+from service.state import MESSAGE_BYTES, STARTING_S, AppState, app_state
 from service.storage.data_lock import FolderInUse, locked
 from service.storage.database import DamagedFile
 from service.storage.stores import storage
-from service.system.background import Background, report_callbacks, reported
+from service.system.background import report_callbacks, reported
 from service.system.confined import hide
 from service.system.memory import MemoryBudget
 from service.system.priority import set_steps
@@ -130,8 +131,9 @@ def create_app(config: Config) -> FastAPI:
         export,
         stream,
     )
-    for router in (each.router for each in api):
-        app.include_router(router)
+    for each in api:  # all but these know of stored renders, or need to know what their pictures take
+        waits = [] if each in (info, preset_routes, stream) else [Depends(_loaded)]
+        app.include_router(each.router, dependencies=waits)
     app.add_api_route("/docs", _docs, include_in_schema=False)
     describe(app, keyed=bool(config.api_key))
     app.mount("/", Files(directory=WEB, html=True))
@@ -232,6 +234,8 @@ class _Server(uvicorn.Server):
         if counter % TICKS == 0:
             with reported("watch of connections"):
                 self._watch.look(self.server_state.connections)
+        if self._state.loading.failed:
+            self.refused = self.should_exit = True
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -278,10 +282,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     state.renderers.start()
     state.storage.assets.start()
     report_callbacks(asyncio.get_running_loop())
-    chores = Background()
-    chores.start("check of the parsers' sandbox", _ask_for_rights(state))
-    await state.resume_renders()
-    state.warming = chores.start("first frame", _warm(app))
+    state.loading.tasks.start("check of the parsers' sandbox", _ask_for_rights(state))
+    state.loading.start(state.resume_renders())
+    state.loading.tasks.start("first frame", _warm(app))
     yield
     await state.farewell()
     await state.renderers.close()
@@ -316,6 +319,10 @@ def _announce(address: str) -> None:
 def _limits(config: Config) -> QueueLimits:
     retention = Retention(config.keep_renders, config.keep_bytes, config.keep_seconds)
     return QueueLimits(config.max_running, config.max_queue, config.max_jobs, retention, config.data_quota)
+
+
+async def _loaded(connection: HTTPConnection) -> None:
+    await app_state(connection).loading.wait(STARTING_S)
 
 
 async def _docs() -> Response:

@@ -20,6 +20,7 @@ from service.batches.queue import BatchQueue
 from service.callbacks.queue import Callbacks
 from service.config import Config
 from service.http.downloads import Downloads
+from service.operation.loading import Loading
 from service.operation.readiness import SOFTWARE, Readiness
 from service.operation.traffic import Traffic
 from service.pack import Packed
@@ -59,7 +60,7 @@ class AppState:
     renderers: Renderers
     render_queue: RenderQueue
     traffic: Traffic = field(default_factory=Traffic)
-    warming: asyncio.Task[None] | None = None  # renders a first frame, and prepares for changes of scene
+    loading: Loading = field(default_factory=Loading)
     address: str = ""  # of the server; "" where there is none, as under a test's client
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
@@ -119,7 +120,8 @@ class AppState:
         stored = await asyncio.to_thread(store.load)
         members, batches = await asyncio.to_thread(store.members), await asyncio.to_thread(store.batches.all)
         await store.open()
-        self.render_queue.resume(stored, self._resumed, self.batches.resume(batches), members)
+        ended = await asyncio.to_thread(store.ended_members)
+        self.render_queue.resume(stored, self._resumed, self.batches.resume(batches), members, ended)
         self.batches.go_on()
         await self.callbacks.start()
 
@@ -183,8 +185,7 @@ class AppState:
 
     async def farewell(self) -> None:
         """Tell all clients that the server ends, and answer open requests; renders go on at the next start."""
-        if self.warming is not None:
-            self.warming.cancel()
+        await self.loading.tasks.close()
         self.renderers.drain()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from typing import Any
 
 import httpx
 import numpy as np
 
+from service.state import AppState
 from tests.serving import SCENE, SMALL, Server
+
+
+async def loaded(state: AppState) -> None:
+    """Let an application answer that has not been started, and has no stored renders."""
+    state.loading.start(asyncio.sleep(0))
+    await state.loading.tasks.ended()
 
 
 def start(http: httpx.Client, settings: Any = SMALL, scene: Any = SCENE) -> Any:

@@ -9,11 +9,12 @@ import time
 from collections.abc import Callable, Collection
 from functools import partial
 
-from service.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, member_id
+from service.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, member_id, step_of
 from service.batches.members import Members
-from service.problems import MISTAKE, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.problems import MISTAKE, Conflict, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.renders.job import Job
 from service.renders.queue import RETRY_S, RenderQueue
+from service.renders.settled import looked_at
 from service.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.renders.store.record import IdempotencyKey, Order, Outcome
 from service.storage.asset_access import AllowedUses
@@ -87,6 +88,7 @@ class BatchQueue:
         for batch in self._batches.values():
             if batch.cancelled:
                 self._cancel(batch)
+            batch.look()  # all of its renders may have ended
             if batch.finished.is_set():
                 self._renders.keep(batch)
             else:
@@ -103,15 +105,35 @@ class BatchQueue:
 
     def waiting(self, id: str, owner: str = "") -> tuple[Batch, int] | None:
         """The batch of a render that is not there yet, and its place in it."""
+        found = self._place(id, owner)
+        return None if found is None or found[0].steps.is_made(found[1]) else found
+
+    async def render(self, id: str, owner: str = "") -> Job:
+        """A render, of a batch or alone. Raises NotFound, Gone, and Conflict for one of a batch that is not there
+        yet."""
+        if (found := self._place(id, owner)) is None:
+            return self._renders.get(id, owner)
+        batch, step = found
+        if not batch.steps.is_made(step):
+            raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
+        return await self.render_of(batch, step)
+
+    async def render_of(self, batch: Batch, step: int) -> Job:
+        """A render that was made. Raises Gone."""
+        renders, id = self._renders, member_id(batch.id, step)
+        return await looked_at(batch, step, id, renders.store, renders.resting, self._made_ended)
+
+    def _place(self, id: str, owner: str) -> tuple[Batch, int] | None:
+        """The batch of a render, and its place in it."""
         if len(id) != ID_DIGITS + STEP_DIGITS:
             return None
         for batch in self._batches.values():  # few, and all ids but those of their renders end here
             if batch.owner == owner and not batch.gone and id.startswith(batch.id[:ID_DIGITS]):
                 try:
-                    step = int(id[ID_DIGITS:], 16)
+                    step = step_of(id)
                 except ValueError:
                     return None
-                if step < batch.order.renders and step not in batch.jobs and member_id(batch.id, step) == id:
+                if step < batch.order.renders and member_id(batch.id, step) == id:
                     return batch, step
         return None
 
@@ -162,7 +184,7 @@ class BatchQueue:
             self._renders.keep(batch)
 
     async def _put_in_line(self, batch: Batch, members: Members | None) -> None:
-        missing = [step for step in range(batch.order.renders) if step not in batch.jobs]
+        missing = [step for step in range(batch.order.renders) if not batch.steps.is_made(step)]
         for step in missing:
             while batch.ahead >= self._ahead and not batch.cancelled:
                 await self._changed(batch)

@@ -14,6 +14,7 @@ scene       its scene: as a document while it waits, packed when it begins
 memory      what a render takes in memory
 documents   what the documents of renders that wait take on the disk, by owner
 retention   which ended renders make room
+settled     ended renders of batches, which are rows of the store
 resting     ended renders whose pictures stay with the renderer
 recorder    writes what becomes of a render to the store
 waiting     waits for an event, for a time

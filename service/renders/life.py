@@ -43,6 +43,11 @@ class PictureAt(Flag):
     BOTH = 3
 
 
+def monotonic(ended_at: float | None) -> float:
+    """A time since 1970, by default now, by the monotonic clock."""
+    return time.monotonic() - max(0.0, time.time() - (ended_at or time.time()))
+
+
 class Life:
     """The state of one render, and what is known of it. Each method is an arrow of the diagram in docs/house.md.
 
@@ -93,7 +98,7 @@ class Life:
     def end(self, outcome: Outcome) -> None:
         """Any state -> Ended, where it stays."""
         self.outcome = outcome
-        self.ended_at = time.monotonic() - max(0.0, time.time() - (outcome.ended_at or time.time()))
+        self.ended_at = monotonic(outcome.ended_at)
         self.finished.set()
         self.close()
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from functools import partial
 from typing import Any, Protocol, runtime_checkable
+from weakref import WeakValueDictionary
 
 from service.problems import ServiceError, Unavailable
 from service.renderers.protocol import Renderers
@@ -12,7 +14,7 @@ from service.renders.followers import Changes
 from service.renders.life import Life
 from service.renders.recorder import Recorder
 from service.renders.scene import RenderScene
-from service.renders.store.record import Order, Outcome, State
+from service.renders.store.record import End, Order, Outcome, State
 from service.requests.request_parser import patched
 from service.system.executors import packing
 
@@ -31,14 +33,24 @@ class InBatch(Protocol):
     ended_at: float  # by the monotonic clock
     counts_as: int  # of the renders of its owner that are kept
     gone: bool  # whether it made room for others, or was deleted
-    jobs: dict[int, Any]  # by step
+    jobs: dict[int, Any]  # by step: those that are under way, or not on the disk
+    shown: WeakValueDictionary[int, Any]  # by step: those on the disk that somebody looks at
 
     @property
     def size(self) -> int: ...
 
+    @property
+    def ids(self) -> Iterator[str]: ...
+
     def add(self, step: int, render: Any) -> None: ...
 
+    def add_ended(self, step: int, state: End, ended_at: float, size: int) -> None: ...
+
     def ended(self, render: Any) -> None: ...
+
+    def settle(self, render: Any) -> None: ...
+
+    def job(self, step: int) -> Any: ...
 
 
 class KeepsPictures(Protocol):

@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 
-from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.problems import FieldError, Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
 from service.renders import listing
 from service.renders.documents import WaitingDocuments
 from service.renders.followers import Follower, Followers
@@ -21,10 +21,11 @@ from service.renders.recorder import Recorder
 from service.renders.resting import Resting
 from service.renders.retention import KeptRenders, QueueLimits
 from service.renders.scene import PackedScenes
+from service.renders.settled import forget, in_memory, settle, take_up
 from service.renders.slots import Slots
 from service.renders.store.batch_rows import BatchOrder
 from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
-from service.renders.store.rows import REMEMBERED
+from service.renders.store.rows import REMEMBERED, EndedMember
 from service.renders.store.store import MEMBER_BYTES, RenderStore
 from service.storage.asset_access import NO_USES, AllowedUses
 from service.storage.quota import QuotaUsedUp
@@ -45,7 +46,7 @@ class RenderQueue:
         """With a `store` renders outlive the server."""
         self.limits = limits
         self.store = store
-        self._jobs: dict[str, Job] = {}  # in the order of arrival
+        self._jobs: dict[str, Job] = {}  # in the order of arrival, without those of batches that are rows
         self._followers = Followers[Job]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
@@ -66,11 +67,13 @@ class RenderQueue:
         make: Callable[[StoredRender], Job],
         batches: Collection[InBatch] = (),
         members: Mapping[str, tuple[int, int]] | None = None,
+        ended: Collection[EndedMember] = (),
     ) -> None:
         """Take up what the store has: ended ones are kept, the others go on or wait. `members`: by the ids of renders
-        of batches the batch's number and the step."""
+        of batches the batch's number and the step; `ended`: those of them that have ended."""
         assert self.store is not None
         known = {batch.number: batch for batch in batches}
+        take_up(batches, ended, self.store)
         for batch in batches:
             self._documents.count(batch, batch.bytes)
         for each in stored:
@@ -144,11 +147,13 @@ class RenderQueue:
         self._number = job.number = max(job.number, self._number + 1)
         self._know(job)
         batch.add(step, job)
-        if not job.finished.is_set():
-            self._slots.add(job)
-            self._slots.dispatch()
-            if job in self._waiting:
-                job.set_aside()
+        if job.finished.is_set():
+            self._chores.start("end of a render", settle(job, batch, self._jobs))
+            return
+        self._slots.add(job)
+        self._slots.dispatch()
+        if job in self._waiting:
+            job.set_aside()
 
     def admit(self, owner: str) -> None:
         """Raise what `submit` would raise, before a scene is read for nothing."""
@@ -278,7 +283,7 @@ class RenderQueue:
                 goes, missing = self._kept.take_for(missing), 2 * missing
                 if not goes:
                     raise
-                await self._forget(self._drop(goes))
+                await forget(self._drop(goes), self.store)
 
     def _ran(self, job: Job) -> None:
         if job.finished.is_set() and job.id in self._jobs:
@@ -292,6 +297,7 @@ class RenderQueue:
                 self._kept.add(job)
             else:
                 job.batch.ended(job)
+                self._chores.start("end of a render", settle(job, job.batch, self._jobs))
         self._evict()
 
     def cancel(self, job: Job) -> None:
@@ -329,10 +335,10 @@ class RenderQueue:
 
     async def delete_batch(self, batch: InBatch) -> None:
         """Forget a batch that has ended, and its pictures. Raises Unavailable where the disk fails."""
-        for job in batch.jobs.values():
+        for job in list(batch.jobs.values()):  # which leave it meanwhile
             await job.recorded()
         self._kept.remove(batch)
-        await self._forget(self._drop([batch]))
+        await forget(self._drop([batch]), self.store)
 
     async def delete(self, job: Job) -> None:
         """Forget an ended render, its document and its picture. Raises Unavailable where the disk fails."""
@@ -350,7 +356,7 @@ class RenderQueue:
             return
         now = time.monotonic()
         if stored := self._drop(self._kept.take_superfluous(now)):
-            self._chores.start("deletion of renders", self._forget(stored))
+            self._chores.start("deletion of renders", forget(stored, self.store))
         # So that room is made also when no more requests come.
         if self._timer is not None:
             self._timer.cancel()
@@ -362,7 +368,7 @@ class RenderQueue:
         """Forget renders and batches; what the store has to forget of them."""
         stored = list[Recorder | InBatch]()
         for each in goes:
-            for job in each.jobs.values() if isinstance(each, InBatch) else [each]:
+            for job in in_memory(each) if isinstance(each, InBatch) else [each]:
                 job.release()
                 self._jobs.pop(job.id, None)
                 self.resting.remove(job)
@@ -374,21 +380,6 @@ class RenderQueue:
             if each.recorder is not None:
                 stored.append(each.recorder)
         return stored
-
-    async def _forget(self, stored: list[Recorder | InBatch]) -> None:
-        if self.store is None:
-            return
-        batches = [each for each in stored if not isinstance(each, Recorder)]
-        recorders = [each for each in stored if isinstance(each, Recorder)]
-        members = [job.recorder for batch in batches for job in batch.jobs.values() if job.recorder is not None]
-        for recorder in recorders + members:
-            await recorder.close()
-        try:
-            await self.store.forget([(recorder.number, recorder.id) for recorder in recorders])
-            for batch in batches:
-                await self.store.forget_batch(batch.number, [job.id for job in batch.jobs.values()])
-        except ServiceError as error:
-            log.warning("could not delete renders from the disk", {"error": error})
 
     def _remember(self, id: str, owner: str, number: int) -> None:
         self._gone[id] = owner, number

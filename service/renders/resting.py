@@ -12,6 +12,7 @@ from service.renders.life import PictureAt
 
 # Bytes of them; the last one stays however large it is. The others come back from the disk.
 RESTING_BYTES = 256 << 20
+RESTING = 256  # renders: each takes 20 KB in this process, too
 SHRINK_S = 0.5  # how long a thread waits for the event loop to free memory
 
 
@@ -38,7 +39,7 @@ class Resting:
                 del self._renders[each.id]
         total = self.bytes
         for each in list(self._renders.values())[:-1]:
-            if total <= RESTING_BYTES:
+            if total <= RESTING_BYTES and len(self._renders) <= RESTING:
                 break
             size = each.resident_bytes
             if each.rest():

@@ -57,8 +57,8 @@ async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequenc
     sent = _Unseekable()
     with zipfile.ZipFile(sent, "w", zipfile.ZIP_STORED) as archive:  # pictures are compressed already
         for step in steps:
-            job = batch.jobs[step]
             try:
+                job = await _render(request, batch, step)
                 written = await picture_file(request, job, query)
             except (Conflict, Gone):
                 continue
@@ -68,6 +68,10 @@ async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequenc
             await writing(partial(archive.writestr, entry, data))
             yield sent.taken()
     yield sent.taken()
+
+
+async def _render(request: Request, batch: Batch, step: int) -> Job:
+    return await app_state(request).batches.render_of(batch, step)
 
 
 def _whole(written: Written) -> bytes:
@@ -109,7 +113,7 @@ async def sheet(
     request: Request, batch: Batch, format: SheetFormat, width: int | None, view: View, steps: list[int]
 ) -> Response:
     """A contact sheet; its cells say of the renders that have no picture how far they are."""
-    cell = _scaled(batch, steps, width)
+    cell = await _scaled(request, batch, steps, width)
     layout = await writing(partial(_layout, batch, cell))
     across, down = await writing(lambda: layout.size)  # which measures every name
     pixels, most = across * down, app_state(request).config.max_pixels
@@ -123,7 +127,7 @@ async def sheet(
 
     async def make(folder: Path) -> Written:
         pictures = _Spooled(folder / "pictures", cell)
-        await pictures.fill(batch, steps, view)
+        await pictures.fill(request, batch, steps, view)
         places = {step: i for i, step in enumerate(steps)}
 
         def write(file: BinaryIO) -> None:
@@ -149,7 +153,7 @@ async def animated(
     view: View,
     steps: list[int],
 ) -> Response:
-    cell = _scaled(batch, steps, width)
+    cell = await _scaled(request, batch, steps, width)
     pixels, most = cell[0] * cell[1] * batch.order.renders, FRAMES * app_state(request).config.max_pixels
     if pixels > most:
         detail = (
@@ -166,7 +170,7 @@ async def animated(
 
     async def make(folder: Path) -> Written:
         pictures = _Spooled(folder / "pictures", cell)
-        await pictures.fill(batch, steps, view)
+        await pictures.fill(request, batch, steps, view)
         animator = Animator(pictures.path, cell, len(steps), format, fps)
         with state.memory.held("pictures", most_memory(cell, len(steps))):
             try:
@@ -237,9 +241,10 @@ class _Spooled:
     def __init__(self, path: Path, size: tuple[int, int]) -> None:
         self.path, self._size = path, size
 
-    async def fill(self, batch: Batch, steps: Sequence[int], view: View) -> None:
+    async def fill(self, request: Request, batch: Batch, steps: Sequence[int], view: View) -> None:
         for step in steps:
-            pixels, _ = await batch.jobs[step].image(view)
+            job = await _render(request, batch, step)
+            pixels, _ = await job.image(view)
             await writing(partial(self._append, pixels))
 
     def _append(self, pixels: np.ndarray) -> None:
@@ -256,9 +261,9 @@ class _Spooled:
             return Image.frombytes("RGB", self._size, file.read(size))
 
 
-def _scaled(batch: Batch, steps: Sequence[int], width: int | None) -> tuple[int, int]:
+async def _scaled(request: Request, batch: Batch, steps: Sequence[int], width: int | None) -> tuple[int, int]:
     """Width and height of one picture: those of the first that is done, scaled down to a width."""
-    settings = batch.jobs[steps[0]].order.settings
+    settings = (await _render(request, batch, steps[0])).order.settings
     if width is None or width >= settings.width:
         return settings.width, settings.height
     return width, max(1, round(settings.height * width / settings.width))

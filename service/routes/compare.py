@@ -154,7 +154,7 @@ class _Sides:
 
     async def _render(self, id: str) -> Still:
         """A render's picture so far. Raises NotFound, Gone, Conflict, InvalidDocument."""
-        job = self.state.render_queue.get(id, self.owner)
+        job = await self.state.batches.render(id, self.owner)
         settings = job.order.settings
         check_pixels(settings.render_width, settings.render_height)
         if settings.denoise:

@@ -32,11 +32,13 @@ async def healthz() -> dict[str, str]:
 @router.get(
     "/readyz",
     summary="Able to render now",
-    description="A small picture was rendered, at most five seconds ago.",
+    description="What is stored was loaded, and a small picture was rendered, at most five seconds ago.",
     responses=answers.problems(503),
 )
 async def readyz(request: Request) -> dict[str, str]:
-    await app_state(request).readiness.check()
+    state = app_state(request)
+    state.loading.check()
+    await state.readiness.check()
     return {"status": "ok"}
 
 

@@ -195,11 +195,10 @@ async def all_progress(request: Request, label: Label = None) -> Response:
 )
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False) -> Response:
     state = app_state(request)
-    renders = state.render_queue
     if (place := state.batches.waiting(id, owner_of(request))) is not None:
         batch, step = place
         return JSONResponse(batch.waiting_status(step))
-    job = renders.get(id, owner_of(request))
+    job = await _render(request, id)
     with waiting.place(request) if wait else contextlib.nullcontext():
         if wait and not await waiting.until(request, job.life.over.wait(), wait):
             return Response(status_code=GONE)
@@ -215,7 +214,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
     responses=answers.EVENTS | answers.problems(404, 410, 429),
 )
 async def progress(request: Request, id: answers.RenderId) -> Response:
-    return events.of_one(request, _render(request, id))
+    return events.of_one(request, await _render(request, id))
 
 
 @router.get(
@@ -227,7 +226,7 @@ async def progress(request: Request, id: answers.RenderId) -> Response:
     responses=answers.RENDER_AGAIN | answers.problems(404, 410, 503),
 )
 async def scene(request: Request, id: answers.RenderId) -> Response:
-    state, job = app_state(request), _render(request, id)
+    state, job = app_state(request), await _render(request, id)
     document = await job.document()
     settings = json.dumps({name: value for name, value in job.order.settings.document().items() if value is not None})
     body = await writing(lambda: f'{{"scene":{unfolded(document)},"settings":{settings}}}'.encode())
@@ -241,7 +240,7 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
     responses=FILES | answers.problems(404, 409, 410, 422, 429, 503),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    job = _render(request, id)
+    job = await _render(request, id)
     return await _image(request, job, query)
 
 
@@ -254,7 +253,7 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
     responses=answers.problems(404, 410, 503),
 )
 async def delete(request: Request, id: answers.RenderId) -> None:
-    renders, job = app_state(request).render_queue, _render(request, id)
+    renders, job = app_state(request).render_queue, await _render(request, id)
     if job.finished.is_set():
         if job.batch is not None:
             raise Conflict("This render belongs to a batch: delete the batch.")
@@ -264,12 +263,9 @@ async def delete(request: Request, id: answers.RenderId) -> None:
         await job.recorded()
 
 
-def _render(request: Request, id: str) -> Job:
+async def _render(request: Request, id: str) -> Job:
     """Raises NotFound, Gone, and Conflict for one of a batch that waits for its turn."""
-    state, owner = app_state(request), owner_of(request)
-    if state.batches.waiting(id, owner) is not None:
-        raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
-    return state.render_queue.get(id, owner)
+    return await app_state(request).batches.render(id, owner_of(request))
 
 
 async def _image(request: Request, job: Job, query: ImageQuery) -> Response:

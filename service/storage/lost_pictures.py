@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Collection
+from collections.abc import Container
 from contextlib import suppress
 from pathlib import Path
 
@@ -64,7 +64,7 @@ class LostPictures:
         """Let nothing here be deleted, even where room is needed."""
         (self.path / KEEP).write_text(WHY)
 
-    def bring_back(self, names: Collection[str]) -> int:
+    def bring_back(self, names: Container[str]) -> int:
         """Move those of these files that are here back, unless others are in their places. Returns how many."""
         count = 0
         for name, _ in self._files():

@@ -174,5 +174,13 @@ MIGRATIONS = (
             "CREATE UNIQUE INDEX batches_by_key ON batches (owner, key) WHERE key IS NOT NULL",
         ),
     ),
+    Migration(
+        "ended renders of batches that are found without their rows, which take 4 KB each",
+        (
+            "DROP INDEX renders_by_batch",
+            "CREATE INDEX renders_of_batches ON renders (batch, state, step, ended_at, id) WHERE batch IS NOT NULL",
+            "CREATE INDEX renders_alone ON renders (gone, number) WHERE batch IS NULL",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -42,6 +42,7 @@ MADE_BY = {
     "8": "944d792",
     "9": "64a7ca7",
     "10": "54ea1eb4",
+    "11": "a8829095",
 }
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")

@@ -20,6 +20,7 @@ from service.routes.submission import allowed
 from service.scene.text import most_bytes
 from service.state import AppState
 from service.system.executors import Pool, packing, saving, storing
+from tests.calls import loaded
 
 MIB = 1 << 20
 GREY = b'{"type": "diffuse", "albedo": 0.5}'
@@ -72,6 +73,7 @@ def calling(folder: Path, test: Callable[[Any], Awaitable[None]], **limits: Any)
         app = create_app(Config(data_dir=folder, api_key=["a", "b"], **limits))
         state: AppState = app.state.sunbox
         state.storage.documents.prepare()
+        await loaded(state)
         try:
             await test(app)
             assert state.uploads.total == 0 and state.memory.used()["bodies"] == 0, "something still counts"

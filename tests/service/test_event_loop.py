@@ -35,6 +35,7 @@ from service.scene.settings import Settings
 from service.state import AppState
 from service.storage import callback_rows, documents
 from service.storage.database import Database
+from tests.calls import loaded
 from tests.counting import LoopWork
 from tests.gltf_files import Gltf
 from tests.service.rendering.fakes import load
@@ -110,6 +111,7 @@ def test_no_answer_holds_the_event_loop(tmp_path: Path, monkeypatch: pytest.Monk
         state: AppState = app.state.sunbox
         try:
             names = await filled(state, tmp_path)
+            await loaded(state)
             described = {path for path, calls in app.openapi()["paths"].items() if "get" in calls}
             assert described | {"/openapi.json"} == ADDRESSES.keys(), "what is its largest answer about?"
             wrong = list[str]()

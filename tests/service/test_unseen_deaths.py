@@ -21,7 +21,7 @@ TESTS = Path(__file__).parent / "rendering" / "test_background.py"
 # all there is to tell.
 OTHERS = {
     "check of the parsers' sandbox", "first frame", "watch of connections", "count of a picture's bytes",
-    "deletion of renders", "look at the cluster's load", "large message", "end of a renderer",
+    "deletion of renders", "end of a render", "look at the cluster's load", "large message", "end of a renderer",
     "watch for nodes that are drained", "signs of life",
 }  # fmt: skip
 # Tasks and threads that are begun elsewhere than in service/system/background.py: whoever begins them awaits them, or

@@ -61,6 +61,22 @@ class _Head:
     driver: str = ""
 
 
+class _Names:
+    """The names of the files of many renders, none of which is in memory."""
+
+    def __init__(self, ids: Collection[str]) -> None:
+        self._ids = frozenset(ids)
+
+    def __contains__(self, name: object) -> bool:
+        id, _, kind = str(name).rpartition(".")
+        return kind in KINDS and id in self._ids
+
+    @staticmethod
+    def key(name: str) -> tuple[str, Kind]:
+        id, _, kind = name.rpartition(".")
+        return id, KINDS[KINDS.index(kind)]
+
+
 class PictureFiles:
     """For any number of threads, of one process. Methods raise OSError where the disk fails.
 
@@ -80,8 +96,7 @@ class PictureFiles:
 
         The pictures of others than `ids` are moved to `lost`, from where those of `ids` come back.
         """
-        known = {f"{id}.{kind}": (id, kind) for id in ids for kind in KINDS}
-        leftovers = {f"{id}.{kind}" for id in gone for kind in KINDS}
+        known, leftovers = _Names(ids), _Names(gone)
         try:
             if back := self.lost.bring_back(known):
                 log.info("moved pictures back whose renders are known again", {"files": back})
@@ -90,8 +105,8 @@ class PictureFiles:
         strangers, crashed = list[str](), list[str]()
         with suppress(FileNotFoundError), os.scandir(self._folder) as entries:
             for entry in entries:
-                if (key := known.get(entry.name)) is not None:
-                    self._count(key, usage(entry.stat()))
+                if entry.name in known:
+                    self._count(known.key(entry.name), usage(entry.stat()))
                 elif entry.name.endswith(PART) or entry.name in leftovers:
                     crashed.append(entry.path)
                 elif entry.name.endswith(SUFFIXES):

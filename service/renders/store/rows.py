@@ -6,9 +6,12 @@ import sqlite3
 import time
 from collections.abc import Collection
 from contextlib import ExitStack
+from itertools import chain
+from typing import NamedTuple
 
 from service.problems import Internal
 from service.renders.store.record import (
+    End,
     IdempotencyKey,
     Order,
     Outcome,
@@ -28,7 +31,21 @@ REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
 DOCUMENT = (
     "SELECT body, patch FROM renders JOIN render_documents ON render_documents.number = base WHERE renders.number = ?"
 )
+_ALONE = "INDEXED BY renders_alone WHERE batch IS NULL"  # these have indices, as the rows of batches are many
+_MEMBERS = "INDEXED BY renders_of_batches WHERE batch IS NOT NULL"
+_UNDER_WAY = "state IN ('queued', 'running')"
+_REMEMBERED = f"(SELECT number FROM renders {_ALONE} AND gone = 1 ORDER BY number DESC LIMIT ?)"
 _COLUMNS = "number, id, owner, label, priority, created_at, settings, bytes, state, ended_at, outcome, gone"
+
+
+class EndedMember(NamedTuple):
+    """An ended render of a batch, which is given by its number."""
+
+    batch: int
+    step: int
+    id: str
+    state: End
+    ended_at: float | None  # s since 1970
 
 
 class RenderRows:
@@ -109,12 +126,27 @@ class RenderRows:
         return int(number)
 
     def members(self) -> dict[str, tuple[int, int]]:
-        """By the ids of renders of batches: the batch's number, and the step."""
+        """By the ids of renders of batches that have not ended: the batch's number, and the step."""
         if not self._database.exists():
             return {}
         with self._database.open() as database:
-            rows = database.execute("SELECT id, batch, step FROM renders WHERE batch IS NOT NULL")
+            rows = database.execute(f"SELECT id, batch, step FROM renders {_MEMBERS} AND {_UNDER_WAY}")
             return {id: (batch, step) for id, batch, step in rows}
+
+    def ended_members(self) -> list[EndedMember]:
+        """The renders of batches that have ended, each batch's one after the other."""
+        if not self._database.exists():
+            return []
+        with self._database.open() as database:
+            ended = f"{_MEMBERS} AND NOT ({_UNDER_WAY}) ORDER BY batch"
+            rows = database.execute(f"SELECT batch, step, id, state, ended_at FROM renders {ended}")
+            return list(map(EndedMember._make, rows))
+
+    def one(self, id: str) -> StoredRender | None:
+        """A render; None where it is deleted."""
+        with self._database.open() as database:
+            row = database.execute(f"SELECT {_COLUMNS} FROM renders WHERE id = ? AND NOT gone", (id,)).fetchone()
+        return None if row is None else stored_render(*row)
 
     def step(self, number: int) -> tuple[bytes, str, int] | None:
         """Of a render of a batch: what varies, along which axes, and the step; None for any other render."""
@@ -140,11 +172,16 @@ class RenderRows:
         return row[0], row[1]
 
     def all(self) -> list[StoredRender]:
-        """Every render, in the order of arrival; those that are gone as far as their ids are remembered."""
+        """Every render but the ended ones of batches, in the order of arrival; those that are gone as far as their
+        ids are remembered."""
         if not self._database.exists():
             return []
         with self._database.open() as database:
-            return stored_renders(database)
+            alone = database.execute(
+                f"SELECT {_COLUMNS} FROM renders {_ALONE} AND (NOT gone OR number IN {_REMEMBERED})", (REMEMBERED,)
+            )
+            of_batches = database.execute(f"SELECT {_COLUMNS} FROM renders {_MEMBERS} AND {_UNDER_WAY}")
+            return sorted((stored_render(*row) for row in chain(alone, of_batches)), key=lambda each: each.number)
 
     def keyed(self, owner: str, key: str) -> tuple[str, StoredRender] | None:
         """The digest and the render of a key that was taken within KEY_S, also where the render is gone."""
@@ -178,8 +215,8 @@ class RenderRows:
             database.executemany("DELETE FROM render_uses WHERE number = ?", ids)
             database.execute("DELETE FROM render_keys WHERE taken_at <= ?", (time.time() - KEY_S,))
             database.execute(
-                "DELETE FROM renders WHERE gone AND number NOT IN (SELECT number FROM render_keys) AND number NOT IN "
-                "(SELECT number FROM renders WHERE gone ORDER BY number DESC LIMIT ?)",
+                f"DELETE FROM renders {_ALONE} AND gone AND number NOT IN (SELECT number FROM render_keys) "
+                f"AND number NOT IN {_REMEMBERED}",
                 (REMEMBERED,),
             )
 

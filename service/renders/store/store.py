@@ -23,7 +23,7 @@ from service.problems import ServiceError, Unavailable
 from service.renders.store.batch_rows import BatchOrder, BatchRows
 from service.renders.store.pictures import KINDS, DamagedPicture, Kind, PictureFiles
 from service.renders.store.record import ENDED, IdempotencyKey, Order, Outcome, StoredRender
-from service.renders.store.rows import RenderRows
+from service.renders.store.rows import EndedMember, RenderRows
 from service.requests.batch_request import document_of_step
 from service.requests.request_parser import patched
 from service.storage.asset_access import AllowedUses
@@ -75,7 +75,8 @@ class RenderStore:
         return True
 
     def load(self) -> list[StoredRender]:
-        """Every render, in the order of arrival, as far as it was stored. Not for an event loop.
+        """Every render but the ended ones of batches, in the order of arrival, as far as it was stored. Not for an
+        event loop.
 
         One that this version cannot read is a failed one, which says so; its row and its files stay as they are.
         """
@@ -90,7 +91,10 @@ class RenderStore:
         if left_out := set[str]().union(*(each.unknown for each in stored)):
             log.warning("left out what this version does not know of renders", {"fields": ",".join(sorted(left_out))})
         kept, gone = ([each.order.id for each in stored if each.gone is is_gone] for is_gone in (False, True))
-        self._files.prepare(kept, gone)
+        ended = [each.id for each in self._rows.ended_members()]
+        self._files.prepare({*kept, *ended}, gone)
+        for id in ended:
+            self._tidy(id)
         return [each if each.gone else self._reached(each) for each in stored]
 
     def _reached(self, render: StoredRender) -> StoredRender:
@@ -99,11 +103,25 @@ class RenderStore:
         if render.unfit is not None:
             return render
         if self._files.has(id, "picture"):
-            if outcome.state in ENDED and self._files.has(id, "checkpoint"):
-                with suppress(OSError):  # a crash came before that was done
-                    self._files.delete(id, "checkpoint")
+            if outcome.state in ENDED:
+                self._tidy(id)
             return render
         return replace(render, outcome=replace(outcome, progress=self._checkpointed(id)))
+
+    def _tidy(self, id: str) -> None:
+        """Delete the checkpoint of an ended render that has a picture, where a crash came before that was done."""
+        if self._files.has(id, "checkpoint") and self._files.has(id, "picture"):
+            with suppress(OSError):
+                self._files.delete(id, "checkpoint")
+
+    async def one(self, id: str) -> StoredRender | None:
+        """A render as it is stored; None where it is deleted."""
+
+        def read() -> StoredRender | None:
+            found = self._rows.one(id)
+            return found if found is None else self._reached(found)
+
+        return await recording(read)
 
     async def open(self) -> None:
         """Be ready for many renders, until `close`."""
@@ -174,8 +192,17 @@ class RenderStore:
         return await recording(insert)
 
     def members(self) -> dict[str, tuple[int, int]]:
-        """By the ids of renders of batches: the batch's number, and the step. Not for an event loop."""
+        """By the ids of renders of batches that have not ended: the batch's number, and the step. Not for an event
+        loop."""
         return self._rows.members()
+
+    def ended_members(self) -> list[EndedMember]:
+        """The ended renders of all batches. Not for an event loop."""
+        return self._rows.ended_members()
+
+    def picture_size(self, id: str) -> int:
+        """The bytes of a render's pictures on the disk."""
+        return self._files.size(id)
 
     async def insert_batch(
         self, order: BatchOrder, body: bytes, uses: AllowedUses, key: IdempotencyKey | None

@@ -15,7 +15,8 @@ from service.batches import queue as batch_queue
 from service.callbacks import queue as callback_queue
 from service.config import Config
 from service.ipc.messages import Checkpoint, Done, Progress, Progressed
-from service.problems import MISTAKE
+from service.operation.loading import Loading
+from service.problems import MISTAKE, Unavailable
 from service.renderers.local import keeper
 from service.renderers.local.supervisor import Supervisor
 from service.renders.job import Job
@@ -89,6 +90,18 @@ def dies(caplog: pytest.LogCaptureFixture) -> Any:
         return dict(background.deaths() - before) == all_of_it and said.count({"what": what}) == times  # type: ignore[arg-type]
 
     return died
+
+
+def test_a_start_that_cannot_load_is_told(dies: Any) -> None:
+    async def test() -> None:
+        loading = Loading()
+        loading.start(broken())
+        await loading.tasks.ended()
+        assert loading.failed and dies("loading of what is stored")
+        with pytest.raises(Unavailable, match="loading"):
+            await loading.wait(0.001)
+
+    asyncio.run(test())
 
 
 def test_what_dies_is_reported_and_told(dies: Any) -> None:

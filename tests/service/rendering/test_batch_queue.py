@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import time
 from dataclasses import replace
@@ -12,15 +13,15 @@ from typing import Any
 
 import pytest
 
-from service.batches.batch import Batch
+from service.batches.batch import Batch, member_id
 from service.batches.members import Members as RealMembers
 from service.batches.queue import BatchQueue
 from service.config import MIB, Config
-from service.problems import TooLarge, TooManyRequests
+from service.problems import MISTAKE, NotFound, TooLarge, TooManyRequests
 from service.renders.job import Job
 from service.renders.queue import RenderQueue
 from service.renders.store.batch_rows import BatchOrder
-from service.renders.store.record import Order, Outcome
+from service.renders.store.record import Order, Outcome, StoredRender
 from service.renders.store.store import RenderStore
 from service.requests.request_parser import folded
 from service.requests.request_reader import RequestReader
@@ -35,7 +36,7 @@ RENDERS = 5
 
 
 class Members:
-    """Makes renders, but for one that is too large and one that meets a mistake of the server's."""
+    """Makes renders."""
 
     def __init__(self, batch: Batch, renderers: Quick) -> None:
         self._batch, self._renderers = batch, renderers
@@ -43,11 +44,22 @@ class Members:
     async def check(self) -> None: ...
 
     async def job(self, step: int, stored: bool) -> Job:
+        return Job(self._renderers, self._batch.member(step), load, b"document", PACKED)  # type: ignore[arg-type]
+
+
+class Faulty(Members):
+    """But for one that is too large and one that meets a mistake of the server's."""
+
+    async def job(self, step: int, stored: bool) -> Job:
         if step == 1:
             raise TooLarge("It never fits.", "/settings/width")
         if step == RENDERS - 1:
             raise ZeroDivisionError
-        return Job(self._renderers, self._batch.member(step), load, b"document", PACKED)  # type: ignore[arg-type]
+        return await super().job(step, stored)
+
+
+async def why(batches: BatchQueue, batch: Batch, step: int) -> Any:
+    return ((await batches.render_of(batch, step)).outcome.problem or {})["detail"]
 
 
 @pytest.mark.parametrize("stored", [False, True])
@@ -59,25 +71,27 @@ def test_a_render_that_cannot_be_made_fails_alone(tmp_path: Path, stored: bool) 
         return Job(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
 
     def queue(renders: RenderQueue) -> BatchQueue:
-        members: Any = lambda batch, body: Members(batch, renderers)  # noqa: E731
+        members: Any = lambda batch, body: Faulty(batch, renderers)  # noqa: E731
         return BatchQueue(renders, members, ended, 2)
 
     async def scenario() -> None:
-        batches = queue(RenderQueue(LIMITS, store))
+        renders = RenderQueue(LIMITS, store)
+        if store is not None:
+            renders.resume([], lambda stored: ended(stored.order, stored.outcome))
+        batches = queue(renders)
         order = BatchOrder("b" * 32, "anna", RENDERS, '[{"turntable": 5}]', created_at=time.time())
         batch = await batches.submit(order, b"", NO_USES, None)
         async with asyncio.timeout(30):
             await batch.finished.wait()
         assert [each["state"] for each in batch.status()["renders"]] == ["done", "failed", "done", "done", "failed"]
-        assert (batch.jobs[1].outcome.problem or {})["detail"] == "It never fits."
-        assert "mistake" in (batch.jobs[RENDERS - 1].outcome.problem or {})["detail"]
+        assert [await why(batches, batch, step) for step in (1, RENDERS - 1)] == ["It never fits.", MISTAKE]
         await batches.close()
 
     asyncio.run(scenario())
     if store is not None:
-        states = [each.outcome.state for each in store.load()]
-        assert sorted(states) == ["done", "done", "done", "failed", "failed"]
-        assert all(each.outcome.ended_at for each in store.load())
+        assert not store.load()
+        assert sorted(each.state for each in store.ended_members()) == ["done", "done", "done", "failed", "failed"]
+        assert all(each.ended_at for each in store.ended_members())
 
 
 def test_a_batch_that_cannot_be_read_ends(tmp_path: Path) -> None:
@@ -177,3 +191,60 @@ def test_a_label_has_no_more_characters_than_a_request_s(tmp_path: Path) -> None
     reader = RequestReader(Config(), Shelf())
     made = RealMembers(Batch(order), folded({"scene": SCENE, "settings": {}}), reader, lambda order, *_: order)  # type: ignore[arg-type,return-value]
     assert len(asyncio.run(made.job(0, True)).label) == 200  # type: ignore[attr-defined]
+
+
+def test_an_ended_render_is_a_row_until_somebody_looks_at_it(tmp_path: Path) -> None:
+    """In the server that rendered it, and in the next one."""
+    renderers, store = Quick(), RenderStore(tmp_path)
+
+    def made(stored: StoredRender) -> Job:
+        return Job(renderers, stored.order, load, outcome=stored.outcome)  # type: ignore[arg-type]
+
+    def ended(order: Order, outcome: Outcome) -> Job:
+        return Job(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
+
+    async def looked_at(renders: RenderQueue, batches: BatchQueue, batch: Batch) -> None:
+        id = member_id(batch.id, 2)
+        job = await batches.render(id, "anna")
+        assert job is await batches.render(id, "anna")
+        assert job.state == "done" and job.batch is batch and job.number
+        renders.resting.remove(job)
+        renderers.listeners.clear()
+        del job
+        gc.collect()
+        assert not batch.shown and not batch.jobs and not renders._jobs
+
+    async def first() -> None:
+        renders = RenderQueue(LIMITS, store)
+        renders.resume([], made)
+        batches = BatchQueue(renders, lambda batch, body: Members(batch, renderers), ended, 2)  # type: ignore[arg-type,return-value]
+        batch = await batches.submit(order, b"", NO_USES, None)
+        await until(lambda: batch.finished.is_set() and not batch.jobs)
+        for job in list(renders.resting._renders.values()):
+            renders.resting.remove(job)
+        del job
+        await looked_at(renders, batches, batch)
+        told.append(batch.status())
+        await batches.close()
+        await renders.close()
+
+    async def second() -> None:
+        renders = RenderQueue(LIMITS, store)
+        batches = BatchQueue(renders, lambda batch, body: Members(batch, renderers), ended, 2)  # type: ignore[arg-type,return-value]
+        stored = store.load(), made, batches.resume(store.batches.all()), store.members(), store.ended_members()
+        renders.resume(*stored)
+        batches.go_on()
+        batch = batches.get(order.id, "anna")
+        await looked_at(renders, batches, batch)
+        told.append(batch.status())
+        assert renders.kept == 1 and batch.size > 0
+        await batches.delete(batch)
+        with pytest.raises(NotFound):
+            await batches.render(member_id(batch.id, 2), "anna")
+        assert not store.ended_members() and not store.batches.all()
+        await renders.close()
+
+    order, told = BatchOrder("b" * 32, "anna", RENDERS, "[]", created_at=time.time(), bytes=1), list[Any]()
+    asyncio.run(first())
+    asyncio.run(second())
+    assert told[0] == told[1]

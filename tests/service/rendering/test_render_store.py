@@ -238,7 +238,7 @@ def test_keys_of_one_owner_are_bounded(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_assets_of_stored_renders_stay(tmp_path: Path) -> None:
     async def test() -> None:
-        kept = storage(Config(data_dir=tmp_path, data_quota=410_000))
+        kept = storage(Config(data_dir=tmp_path, data_quota=436_000))
         store = RenderStore(tmp_path, kept.quota.room)
         used, other = (kept.assets.add(OBJ + b"#" * size).id for size in (10, 20))
         number = await store.insert(order("a"), Outcome(), DOCUMENT, AllowedUses("", (used,)))
