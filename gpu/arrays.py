@@ -44,6 +44,10 @@ class EnvironmentArrays:
     sun_share: float = 0.0
     key: str = ""  # equal where all but rotation, scale and background are
 
+    @property
+    def bytes(self) -> int:
+        return self.texels.nbytes + self.probability.nbytes + self.cells.nbytes
+
     def has_map_of(self, other: EnvironmentArrays) -> bool:
         """Whether this is the other one, turned or brightened at most: all of their other members are the same."""
         names = (each.name for each in fields(self) if each.name not in ("rotation", "scale", "key"))

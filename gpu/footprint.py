@@ -22,8 +22,7 @@ def unshared_bytes(scene: SceneArrays) -> int:
     """About how many of these bytes are the scene's alone, and not in uploads that it shares with others."""
     shared = 0
     if scene.environment is not None and scene.environment.key:
-        e = scene.environment
-        shared += e.texels.nbytes + e.probability.nbytes + e.cells.nbytes
+        shared += scene.environment.bytes
     if scene.textures is not None and scene.textures.key:
         shared += scene.textures.texels.nbytes + scene.textures.floats.nbytes
     if scene.measured_key:

@@ -13,6 +13,7 @@ from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.bsdf.evaluator import BsdfEvaluator
+from gpu.device.blank import dispatch_blank
 from gpu.device.scene import Scene
 from gpu.device.uploads import SharedUploads
 from gpu.errors import SceneTooLarge, WrongThread
@@ -94,14 +95,31 @@ class Renderer:
         return self._bsdf
 
     def tidy(self) -> float | None:
-        """Evict kernels that have not been used for long. Returns the seconds until the next call is due, or None."""
+        """Release kernels and uploads that have not been used for long. Returns the seconds until the next call is
+        due, or None."""
         self._own()
-        return self._kernels.tidy()
+        before = self._shared.resting_bytes
+        left = self._kernels.tidy(), self._shared.tidy()
+        if self._shared.resting_bytes < before:
+            self.let_go()
+        return min((each for each in left if each is not None), default=None)
+
+    def let_go(self) -> None:
+        """Give the memory of released scenes back to the machine, where the driver keeps what the last dispatch read.
+        Raises CompileError, DeviceLost."""
+        self._own()
+        if self.info["software"]:
+            dispatch_blank(self.context, self._kernels)
 
     @property
     def shared_bytes(self) -> int:
         """About how many bytes of the device scenes take together for what they share."""
         return self._shared.bytes
+
+    @property
+    def resting_bytes(self) -> int:
+        """About how many bytes of the device are kept for a moment, and used by no scene."""
+        return self._shared.resting_bytes
 
     @property
     def kernels(self) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ctypes
 import ipaddress
 import logging
 import os
@@ -67,6 +66,7 @@ from service.system.background import report_callbacks, reported
 from service.system.confined import hide
 from service.system.memory import MemoryBudget
 from service.system.priority import set_steps
+from service.system.shared_memory import return_freed
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # seconds between pings: proxies cut connections that are idle for a minute
@@ -89,8 +89,6 @@ CROWDED = (
 )
 
 FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX_CONNECTIONS).", 5)
-
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 log = logging.getLogger(__name__)
 
@@ -147,7 +145,7 @@ def create_app(config: Config) -> FastAPI:
 
 def run(config: Config) -> int:
     """Print the address and serve until SIGINT or SIGTERM. Returns the exit code: 1 where it could not start."""
-    _give_memory_back()
+    return_freed()
     hide()
     sys.setswitchinterval(SWITCH_S)
     set_steps(config.nice)
@@ -327,12 +325,3 @@ async def _loaded(connection: HTTPConnection) -> None:
 
 async def _docs() -> Response:
     return FileResponse(WEB / "docs.html")
-
-
-def _give_memory_back() -> None:
-    """Make glibc return freed blocks of a megabyte or more at once. By default it learns to reuse blocks of up to
-    32 MiB, such as a scene's arrays: after packing a mesh of a million triangles it had 95 MB of them."""
-    with contextlib.suppress(AttributeError):  # another C library
-        libc = ctypes.CDLL(None)
-        libc.mallopt(M_MMAP_THRESHOLD, 1 << 20)
-        libc.mallopt(M_TRIM_THRESHOLD, 4 << 20)

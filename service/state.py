@@ -77,6 +77,8 @@ class AppState:
         self.memory = self.reader.memory
         loader = self.storage.assets.loader
         self.memory.cache("assets", lambda: loader.bytes, loader.shrink)
+        self.memory.cache("scenes", self._resting_bytes, lambda size: None)
+        self.memory.cache("assets", loader.sandbox.children.working_bytes, lambda size: None)
         self.memory.cache("pictures", lambda: 0, self.render_queue.resting.shrink)  # renders count themselves
         self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)
         self.bodies = Bodies(self.config, self.memory)
@@ -157,11 +159,17 @@ class AppState:
         """The packed scene of an owner's folded document, which was valid when it was stored. Raises what reading it
         raises.
 
-        `count` is called with the bytes of memory that parsing takes, before parsing begins."""
+        `count` is called with the bytes of memory that parsing takes, before it begins, and packing likewise."""
         body = await packing(lambda: bytearray(unfolded(document), "ascii"))
         count(await packing(partial(self.bodies.memory_for, body)))
         scene: Scene = await self.bodies.parsed("scene", body)
-        return await packing(partial(self.reader.pack, scene, owner=owner))
+        return await packing(partial(self.reader.pack, scene, owner=owner, hold=count))
+
+    def _resting_bytes(self) -> int:
+        """What renderers on processors keep for a moment in this machine's memory."""
+        if self.config.ray is not None:  # theirs are other machines
+            return 0
+        return sum(member.statistics.held.resting_bytes for member in self.renderers.members)
 
     async def gpu_missing(self) -> str | None:
         """The reason why SUNBOX_REQUIRE_GPU forbids to start, or None. Waits for the renderer."""

@@ -5,5 +5,6 @@ buffers   the arrays of a scene as buffers, and their upload after shapes have m
 lamps     the lamps that distances in media are drawn towards
 textures  images and rows of numbers as textures
 uploads   what several scenes read, uploaded once
+blank     a dispatch after which a software driver has nothing of released scenes
 pinned    buffers that are the caller's own memory, on a software renderer
 """

@@ -3,6 +3,7 @@ displays."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -49,6 +50,7 @@ def _texture_bytes(texture: Any) -> int:
 
 
 T = TypeVar("T", bound=Upload)
+KEPT_S = 1.0  # for which an upload stays that nobody uses
 
 
 @dataclass(frozen=True)
@@ -64,11 +66,12 @@ class _Shared(Generic[T]):
     upload: T
     bytes: int
     users: int = 0
+    left_at: float = 0.0  # when the last user left
 
 
 class UploadCache(Generic[T]):
-    """Uploads by a key that is equal where they are. The one that was released last stays, so that an edit which
-    packs the scene anew does not upload it again."""
+    """Uploads by a key that is equal where they are. The one that was released last stays for a moment, so that an
+    edit which packs the scene anew, or the next picture of a batch, does not upload it again."""
 
     def __init__(self) -> None:
         self._shared: dict[str, _Shared[T]] = {}
@@ -77,6 +80,19 @@ class UploadCache(Generic[T]):
     def bytes(self) -> int:
         """Bytes of those that are in use."""
         return sum(shared.bytes for shared in self._shared.values() if shared.users)
+
+    @property
+    def resting_bytes(self) -> int:
+        """Bytes of what is kept and not in use."""
+        return sum(shared.bytes for shared in self._shared.values() if not shared.users)
+
+    def tidy(self, now: float) -> float | None:
+        """Release what has not been used for long. Returns the seconds until the next call is due, or None."""
+        resting = {key: now - shared.left_at for key, shared in self._shared.items() if not shared.users}
+        for key in [key for key, age in resting.items() if age >= KEPT_S]:
+            self._shared.pop(key).upload.release()
+            del resting[key]
+        return KEPT_S - max(resting.values()) if resting else None
 
     def take(self, key: str, make: Callable[[], T]) -> Taken[T]:
         """The upload of that key; without a key, one that nobody else has. Raises what `make` raises."""
@@ -100,6 +116,7 @@ class UploadCache(Generic[T]):
             return
         self._shared[key].users -= 1
         if self._shared[key].users == 0:
+            self._shared[key].left_at = time.monotonic()
             for other in [k for k, shared in self._shared.items() if shared.users == 0 and k != key]:
                 self._shared.pop(other).upload.release()
 
@@ -117,6 +134,15 @@ class SharedUploads:
     @property
     def bytes(self) -> int:
         return sum(cache.bytes for cache in vars(self).values())
+
+    @property
+    def resting_bytes(self) -> int:
+        return sum(cache.resting_bytes for cache in vars(self).values())
+
+    def tidy(self) -> float | None:
+        """Release what has not been used for long. Returns the seconds until the next call is due, or None."""
+        now = time.monotonic()
+        return min((left for cache in vars(self).values() if (left := cache.tidy(now)) is not None), default=None)
 
     def release(self) -> None:
         for cache in vars(self).values():

@@ -12,6 +12,7 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
 from gpu.bsdf import kernels as bsdf
+from gpu.device import blank
 from gpu.device.textures import KINDS, bound_textures, rows
 from gpu.kernels import features
 from gpu.kernels.binaries import ENTRIES, binary_file
@@ -110,8 +111,8 @@ def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[Kerne
 
 
 def common_keys() -> list[KernelKey]:
-    """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, and those that
-    show a picture."""
+    """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, those that show a
+    picture, and the one that reads nothing."""
     shown = [
         ("resolve.comp", resolve.defines(Look(tone_map=curve), dtype))
         for curve in TONE_MAPS
@@ -119,7 +120,7 @@ def common_keys() -> list[KernelKey]:
     ]
     metered = [("meter.comp", noise_meter.defines(*which)) for which in ((1, 0), (0, 0), (0, 1))]
     summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]
-    entries = [*metered, *summed, *shown]  # the first frames of a stream need those first
+    entries = [*metered, *summed, *shown, (blank.ENTRY, blank.DEFINES)]  # a stream's first frames need those first
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Protocol
 
-import numpy as np
-
 from service.assets.errors import MissingExtra, ParseError
 from service.assets.sandbox.sandbox import Sandbox
-from service.assets.types import AssetLimits, Assets, ImageData, LutData, MeasuredData, MeshData
+from service.assets.types import AssetLimits, Assets, ImageData, LutData, MeasuredData, MeshData, array_bytes
 from service.problems import AssetError, NotProvided
 
 Parsed = MeshData | ImageData | LutData | MeasuredData
@@ -68,24 +66,24 @@ class ParsedCache:
         return parsed
 
     def _cache(self, key: str, parsed: Parsed, ahead: bool) -> None:
-        if _bytes(parsed) > self.sandbox.limits.cache_bytes:
+        if array_bytes(parsed) > self.sandbox.limits.cache_bytes:
             self._large = (key, parsed) if ahead else self._large
             return
         self._cached[key] = parsed
-        room = self.sandbox.limits.cache_bytes - sum(map(_bytes, self._cached.values()))
+        room = self.sandbox.limits.cache_bytes - sum(map(array_bytes, self._cached.values()))
         while room < 0:
-            room += _bytes(self._cached.popitem(last=False)[1])
+            room += array_bytes(self._cached.popitem(last=False)[1])
 
     @property
     def bytes(self) -> int:
         with self._lock:
-            return sum(map(_bytes, self._cached.values())) + (_bytes(self._large[1]) if self._large else 0)
+            return sum(map(array_bytes, self._cached.values())) + (array_bytes(self._large[1]) if self._large else 0)
 
     def shrink(self, size: int) -> None:
         """Free that many bytes, or all, beginning with the asset that was loaded longest ago."""
         with self._lock:
             while size > 0 and self._cached:
-                size -= _bytes(self._cached.popitem(last=False)[1])
+                size -= array_bytes(self._cached.popitem(last=False)[1])
             if size > 0:
                 self._large = None
 
@@ -128,7 +126,3 @@ def refused(name: str, error: ParseError) -> AssetError | NotProvided:
     """What a caller is told of a file that is not read."""
     detail = f"{name}: {error}"
     return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
-
-
-def _bytes(parsed: Parsed) -> int:
-    return sum(value.nbytes for value in vars(parsed).values() if isinstance(value, np.ndarray))

@@ -55,6 +55,11 @@ class MeshData:
         return corners.min(axis=0), corners.max(axis=0)
 
 
+def array_bytes(parsed: object) -> int:
+    """The bytes of the arrays that are its members."""
+    return sum(value.nbytes for value in vars(parsed).values() if isinstance(value, np.ndarray))
+
+
 @dataclass(frozen=True)
 class ImageData:
     """Texels as stored, row 0 at the top of the image; nothing is decoded from sRGB. The array is read-only."""

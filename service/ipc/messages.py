@@ -335,6 +335,7 @@ class Usage:
     samples: int
     tasks: int
     bytes: int  # on the device
+    resting: int  # more of the machine's memory: of a software renderer, for what no task uses just now
     kernels: int
     evicted: int  # kernels, since the last one
     task: int = 0  # of nobody in particular

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gpu import EnvironmentArrays, SceneArrays
+from gpu import EnvironmentArrays, SceneArrays, scene_bytes
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets, ImageData, MeasuredData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
@@ -49,12 +49,21 @@ class Limits(Protocol):
     def max_texels(self) -> int: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Packed:
-    """A packed scene. Its arrays share memory with the cache and must not be written to."""
+    """A packed scene. Its arrays share memory with the cache and must not be written to. Equal is only itself: its
+    bytes are counted for it as long as it is there."""
 
     arrays: SceneArrays
     warnings: list[str]
+
+    @property
+    def bytes(self) -> int:
+        """The bytes that a copy of it takes. Of an environment that other scenes share, the server's copy counts in
+        its cache, and so half of it here."""
+        environment = self.arrays.environment
+        shared = environment.bytes if environment is not None and environment.key else 0
+        return scene_bytes(self.arrays) - shared // 2
 
 
 @dataclass(frozen=True)

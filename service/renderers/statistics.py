@@ -48,6 +48,16 @@ class ClientStatistics:
     errors: Counter[str] = field(default_factory=Counter)  # told on streams and of failed renders, by problem type
 
 
+@dataclass(frozen=True)
+class Held:
+    """What the renderer has now."""
+
+    tasks: int = 0
+    bytes: int = 0  # of theirs, on the device
+    resting_bytes: int = 0  # more of the machine's memory, that is kept for a moment
+    kernels: int = 0  # compiled ones
+
+
 @dataclass
 class Statistics(ClientStatistics):
     """One renderer's, which may be the only one, and then its clients' too."""
@@ -62,7 +72,5 @@ class Statistics(ClientStatistics):
     compile_s: Distribution = field(default_factory=Distribution)  # kernels that were not in memory
     kernels_found: int = 0  # ... and loads that found theirs there
     setup_s: Distribution = field(default_factory=Distribution)  # uploading and compiling, a load
-    tasks: int = 0  # that the renderer holds
-    gpu_bytes: int = 0  # what they hold there
-    kernels: int = 0  # compiled ones, there
+    held: Held = field(default_factory=Held)
     kernels_evicted: int = 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.quality import ResolvedSettings
-from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
 
 COPIES = 2  # of a packed scene: the server's, with which another renderer could go on, and the renderer's
@@ -21,7 +20,7 @@ class RenderMemory:
     def __init__(self, settings: ResolvedSettings, budget: MemoryBudget | None = None) -> None:
         """Without a budget nothing is counted."""
         self.scene_bytes = 0  # as far as it is known
-        self.reading_bytes = 0  # that parsing its document takes, as far as it is known
+        self.reading_bytes = 0  # that parsing and packing its document take, as far as it is known
         self._budget = budget
         self._settings = settings
 
@@ -37,7 +36,7 @@ class RenderMemory:
 
     def packed(self, packed: Packed) -> None:
         """Note how large the scene is."""
-        self.scene_bytes = weight(packed)
+        self.scene_bytes = packed.bytes
 
     def check(self) -> None:
         """Raises TooLarge for a render that never fits."""
@@ -77,8 +76,9 @@ class RenderMemory:
             self._budget.hold("scenes", self, self.scene_bytes)
 
     def read(self, size: int) -> None:
-        """Count that parsing the document takes so many bytes. Raises TooLarge, Unavailable."""
-        self.reading_bytes = size
+        """Count that parsing or packing the document takes so many bytes, one after the other. Raises TooLarge,
+        Unavailable."""
+        self.reading_bytes = max(self.reading_bytes, size)
         self.hold(reads=True)
 
     def release(self) -> None:

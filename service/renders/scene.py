@@ -13,7 +13,8 @@ from service.renders.memory import RenderMemory
 from service.requests.request_reader import stop_rule
 from service.system.memory import MemoryBudget
 
-# Packs the scene of a folded document; it calls its second argument with the bytes of memory that parsing takes.
+# Packs the scene of a folded document; it calls its second argument with the bytes of memory that parsing takes, and
+# packing.
 Load = Callable[[bytes, Callable[[int], None]], Awaitable[Packed]]
 
 
@@ -81,12 +82,18 @@ class RenderScene:
         if budget is not None and size:
             budget.count("documents", self, size)  # the values that it was made from are more, and count until here
         if packed is not None:
-            self.memory.packed(packed)
+            self._take_over(packed)
             self.memory.check()
             try:
                 self.memory.hold_scene()
             except Unavailable:
                 self._packed = None
+
+    def _take_over(self, packed: Packed) -> None:
+        """From now on the scene counts here."""
+        if self._budget is not None:
+            self._budget.release(packed)
+        self.memory.packed(packed)
 
     def forget_document(self) -> None:
         """The store has it, or the render is given up."""
@@ -132,7 +139,7 @@ class RenderScene:
         self.memory.hold(reads=packed is None)
         if packed is None:
             packed = await self._load(await document(), self.memory.read)
-        self.memory.packed(packed)
+        self._take_over(packed)
         return packed
 
     def update(self, task: int, packed: Packed) -> Update:

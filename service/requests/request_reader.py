@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from service.assets.cache import AnyAssets, as_lut
@@ -14,7 +14,7 @@ from service.quality import ResolvedSettings
 from service.requests.request_parser import RequestParser
 from service.scene import Material, Scene
 from service.storage.asset_access import AssetAccess
-from service.system.memory import Limit, MemoryBudget
+from service.system.memory import Limit, MemoryBudget, work
 
 # That renders share: the tables of a map of 512 x 256 texels take 70 ms to make, those of a MERL file 200 ms.
 SHARED = 4
@@ -41,11 +41,20 @@ class RequestReader(RequestParser):
         self._access = access
         self._shared = PackCache(SHARED, self.caches)
 
-    def pack(self, scene: Scene, cache: PackCache | None = None, *, owner: str) -> Packed:
-        """`owner`: whose assets the scene may use; "": all, for scenes of the server itself and without keys."""
+    def pack(
+        self, scene: Scene, cache: PackCache | None = None, *, owner: str, hold: Callable[[int], None] | None = None
+    ) -> Packed:
+        """`owner`: whose assets the scene may use; "": all, for scenes of the server itself and without keys.
+
+        `hold` is called with the bytes that packing takes, before it takes them; by default they count on their own.
+        The packed scene counts in the memory until it is garbage, or until whoever counts it from then on releases
+        it there. Raises TooLarge, Unavailable as well.
+        """
         assets = self._assets if self._access is None else self._access.view(owner, scene)
-        with _under("/scene"):
-            return pack(scene, assets, cache, self._config, self._shared)
+        with _under("/scene"), self.memory.growing("scenes") as own, work(hold or own):
+            packed = pack(scene, assets, cache, self._config, self._shared)
+            self.memory.count("scenes", packed, packed.bytes)
+            return packed
 
     def pack_material(self, material: Material, *, owner: str) -> SceneData:
         """The same for one material, which has no textures; pointers begin with /material."""
@@ -66,12 +75,6 @@ class RequestReader(RequestParser):
 
 def stop_rule(settings: ResolvedSettings) -> StopRule:
     return StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
-
-
-def weight(packed: Packed) -> int:
-    """The bytes that the arrays of a packed scene take."""
-    parts = [vars(part) for part in (packed.arrays, packed.arrays.textures) if part is not None]
-    return sum(getattr(value, "nbytes", 0) for part in parts for value in part.values())
 
 
 @contextmanager

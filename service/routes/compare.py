@@ -23,7 +23,6 @@ from service.renders.job import Job
 from service.requests import compare_request
 from service.requests.compare_request import ParsedComparison, check_pixels, check_sizes
 from service.requests.request_parser import ParsedRequest
-from service.requests.request_reader import weight
 from service.routes import answers, compare_answers, submission, waiting
 from service.routes.errors import GONE
 from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
@@ -134,7 +133,8 @@ class _Sides:
             packed = await packing(partial(self.state.reader.pack, parsed.scene, owner=self.owner))
         except InvalidDocument as error:
             raise error.under(pointer) from None
-        self.scene_bytes += weight(packed)
+        self.state.memory.release(packed)
+        self.scene_bytes += packed.bytes
         self.hold_scenes(self.scene_bytes)
         return Source(parsed.settings, partial(self._rendered, parsed.document, packed, pointer))
 

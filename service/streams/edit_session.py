@@ -14,7 +14,7 @@ from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.renderers.working_states import WorkingStates
 from service.renders.memory import COPIES, picture_bytes
-from service.requests.request_reader import RequestReader, stop_rule, weight
+from service.requests.request_reader import RequestReader, stop_rule
 from service.scene import Scene, merge_patch
 from service.scene.document import Parsed
 from service.scene.text import weigh
@@ -187,7 +187,8 @@ class EditSession:
         touched = None if old is None else self._diff(old, new)
         if old is None or touched is None or touched.whole:
             packed = self._reader.pack(new.scene, self._cache, owner=self._owner)
-            self._reader.memory.hold("scenes", self, COPIES * weight(packed))
+            self._reader.memory.release(packed)
+            self._reader.memory.hold("scenes", self, COPIES * packed.bytes)
             edit = None if old is None else scene_edit(self._arrays, packed.arrays)
             self._arrays = packed.arrays
             if old is None or edit is None:

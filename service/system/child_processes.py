@@ -22,6 +22,7 @@ from service.system.cpu_time import answers
 from service.system.priority import working_niceness
 
 ROOT = Path(__file__).parents[2]
+PAGE = os.sysconf("SC_PAGE_SIZE")
 START_SECONDS = 30.0  # libraries read from a cold disk
 RIGHTS_BYTES = 4096  # of the message that says what a child gave up
 CLOSING_SECONDS = 5.0  # from a hung-up socket to the end of its process
@@ -77,6 +78,7 @@ class Child:
             os.close(line)
         self.is_spent = False
         self.given = 0  # how often it got work
+        self.rest = 0  # bytes of its own when it got the work at hand
         self._rights: Rights | None = None
 
     def rights(self) -> Rights | None:
@@ -98,6 +100,15 @@ class Child:
         except subprocess.TimeoutExpired:
             return None
 
+    def own_bytes(self) -> int:
+        """Of its memory what is no file and shared with nobody; 0 where it has ended."""
+        try:
+            with open(f"/proc/{self.process.pid}/statm") as sizes:
+                _, resident, shared, *_ = map(int, sizes.read().split())
+        except (OSError, ValueError):
+            return 0
+        return (resident - shared) * PAGE
+
     def kill(self) -> None:
         self.process.kill()
         self.process.wait()
@@ -118,6 +129,7 @@ class Children:
         self._module, self._most, self._environment = module, most, environment or {}
         self._lock = threading.Lock()
         self._idle: list[Child] = []
+        self._working = set[Child]()
         self._is_closed = False
 
     @property
@@ -126,16 +138,28 @@ class Children:
         with self._lock:
             return list(self._idle)
 
+    def working_bytes(self) -> int:
+        """The bytes that the work at hand has taken so far in the children, as the system counts them."""
+        with self._lock:
+            working = list(self._working)
+        return sum(max(0, child.own_bytes() - child.rest) for child in working)
+
     @contextmanager
     def one(self) -> Iterator[Child]:
         """A child of the caller's own, which is killed where the block raises. Raises Closed."""
         child = self._take()
         child.given += 1
+        child.rest = child.own_bytes()
+        with self._lock:
+            self._working.add(child)
         try:
             yield child
         except BaseException:
             child.kill()
             raise
+        finally:
+            with self._lock:
+                self._working.remove(child)
         if child.is_spent or child.given >= self._most:
             child.kill()
             child = self._start()  # it is ready when the next work comes

@@ -1,6 +1,7 @@
 """One budget of memory (SUNBOX_MEMORY) for the bodies, scenes and pictures of all callers, and for caches.
 
-It counts neither what the processes take when idle nor what one piece of work allocates for a moment.
+It does not count what the processes take when idle. What a large piece of work takes while it is done counts where
+that is known: `takes` says it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
@@ -50,6 +52,41 @@ class _Account:
 
     caller: str = field(default_factory=CALLER.get)
     sizes: dict[Category | Limit, int] = field(default_factory=dict)
+
+
+class _Work:
+    """What a piece of work takes while it is done, as the sum of its parts."""
+
+    def __init__(self, hold: Callable[[int], None]) -> None:
+        self._hold = hold
+        self._parts = dict[str, int]()
+
+    def takes(self, part: str, size: int) -> None:
+        self._parts[part] = size
+        if (total := sum(self._parts.values())) >= MIB:
+            self._hold(total)
+
+
+_WORK: ContextVar[_Work | None] = ContextVar("WORK", default=None)
+
+
+@contextmanager
+def work(hold: Callable[[int], None]) -> Iterator[None]:
+    """A context in which `takes` calls `hold` with the bytes that are taken in all, from a MiB on."""
+    token = _WORK.set(_Work(hold))
+    try:
+        yield
+    finally:
+        _WORK.reset(token)
+
+
+def takes(part: str, size: int) -> None:
+    """Say that the work at hand is about to take `size` bytes for a part of it, in the place of what it said before.
+
+    Raises what the `hold` of its context raises, which is TooLarge or Unavailable.
+    """
+    if (found := _WORK.get()) is not None:
+        found.takes(part, size)
 
 
 class Holder:

@@ -106,9 +106,22 @@ def reuse_freed() -> None:
 
     Pages that are new to a process cost 2 to 3 us each in a virtual machine: of packing a million triangles, a tenth.
     """
+    _set({_TRIM_THRESHOLD: 1 << 30, _TOP_PAD: 1 << 24, _MMAP_THRESHOLD: 1 << 25})
+
+
+def return_freed(block: int = 1 << 20) -> None:
+    """Make the C library return freed blocks of that many bytes or more at once, in a process that stays.
+
+    By default it learns to reuse blocks of up to 32 MiB, such as a scene's arrays: after packing a mesh of a million
+    triangles it had 95 MB of them.
+    """
+    _set({_MMAP_THRESHOLD: block, _TRIM_THRESHOLD: 4 << 20})
+
+
+def _set(parameters: dict[int, int]) -> None:
     with suppress(OSError, AttributeError):  # only glibc has it
         library = ctypes.CDLL(None)
-        for parameter, size in ((_TRIM_THRESHOLD, 1 << 30), (_TOP_PAD, 1 << 24), (_MMAP_THRESHOLD, 1 << 25)):
+        for parameter, size in parameters.items():
             library.mallopt(parameter, size)
 
 

@@ -17,9 +17,11 @@ from service.logs import setup
 from service.system.confined import hide
 from service.system.lifeline import end_with
 from service.system.priority import raise_process_niceness
+from service.system.shared_memory import return_freed
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
 DEVICES = Path("/dev/dri")
+FREED = 8 << 20  # bytes from which on a freed block returns to the machine: more than a picture's that is read
 
 log = logging.getLogger("service.worker")  # __name__ is __main__ here
 
@@ -47,6 +49,7 @@ def main() -> int:
     hide()  # not before: its /proc folder is root's from then on
     setup.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     setup.always(renderer=arguments.name)
+    return_freed(FREED)  # a scene's arrays and, of a software renderer, its textures
     try:
         code = _serve(socket.socket(fileno=arguments.descriptor), arguments)
     except channel.Closed:

@@ -47,6 +47,7 @@ REPORT_S = 0.25  # between two accounts of the GPU time that was used
 # can; but the driver may have dropped what that compiled.
 COMPILING_S = 300.0
 
+
 log = logging.getLogger(__name__)
 
 
@@ -89,7 +90,7 @@ class Loop:
         )
         self._foreseen = ForeseenKernels(self._compiler)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
-        self._traced = self._evicted = 0
+        self._traced = self._evicted = self._resting = 0
         self._reported = 0.0
         self.handlers = self._table()
 
@@ -132,6 +133,7 @@ class Loop:
             waits = [self._compiler.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
             waits += [task.left_s for task in self._tasks.values()]
+            self._account(at_once=True)  # what tidying has changed
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
@@ -163,17 +165,23 @@ class Loop:
     def _account(self, at_once: bool) -> None:
         """Report the GPU time that was used, now and then, and at once before the loop sleeps."""
         now = time.monotonic()
-        if self._used_s and (at_once or now - self._reported >= REPORT_S):
+        resting = self._resting_bytes
+        if (self._used_s or resting != self._resting) and (at_once or now - self._reported >= REPORT_S):
             pictures: list[Task | Assistant] = [*self._tasks.values(), *self._assistants.values()]
             traced = sum(each.traced for each in pictures)
             used = dict(self._used_s)
             self._renderer.tidy()
             kernels, evicted = self._renderer.kernels, self._renderer.kernels_evicted
-            now_held = len(self._tasks), self._memory.used, kernels
+            self._resting = self._resting_bytes
+            now_held = len(self._tasks), self._memory.used, self._resting, kernels
             self._send(Usage(used, traced - self._traced, *now_held, evicted - self._evicted))
             self._used_s.clear()
             self._evicted = evicted
             self._traced, self._reported = traced, now
+
+    @property
+    def _resting_bytes(self) -> int:
+        return self._renderer.resting_bytes if self._renderer.info["software"] else 0
 
     def _table(self) -> dict[type, Callable[[Any], object]]:
         """The handler of each type of message, one for each of `ToRenderer`."""
@@ -257,6 +265,7 @@ class Loop:
         self._traced -= task.traced
         del self._tasks[task.number]
         task.release()
+        self._renderer.let_go()
 
     def _guard(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
         try:

@@ -208,7 +208,7 @@ def compiling_instantly(gpu: Renderer, priority: Priority) -> tuple[CompileClien
 
 
 def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> None:
-    """What pictures are shown with, and what the noise meter and `adaptive` ask."""
+    """What pictures are shown with, what the noise meter and `adaptive` ask, and what makes a driver let go."""
     asked = []
     for _ in range(2):
         compiler, helper = compiling_instantly(gpu, "soon")
@@ -217,7 +217,7 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
             compiler.hear()
         assert all(compiler.has(key) for key in common_keys())
         asked.append(helper.asked)
-    assert asked == [common_keys(), []] and len(common_keys()) == 17
+    assert asked == [common_keys(), []] and len(common_keys()) == 18
 
 
 def test_what_may_be_needed_some_time_waits_for_the_first_minute(gpu: Renderer, cold: Path) -> None:

@@ -198,8 +198,11 @@ def assets(tmp_path: Path) -> Iterator[AssetStore]:
     store.close()
 
 
+HEIGHT = 400
+
+
 def start(width: int, generation: int) -> protocol.Start:
-    settings = {"width": width, "height": 100, "max_samples": 1}
+    settings = {"width": width, "height": HEIGHT, "max_samples": 1}
     return protocol.Start(type="start", generation=generation, scene=SCENE, settings=settings)
 
 
@@ -209,12 +212,12 @@ def edit(session: EditSession, message: protocol.Start) -> None:
 
 
 def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
-    budget = MemoryBudget(200 * 100 * RENDERED_PIXEL_BYTES)
+    budget = MemoryBudget(200 * HEIGHT * RENDERED_PIXEL_BYTES + 1_200_000)  # with the scenes of two
     reader = RequestReader(Config(), assets, budget)
     session, other = EditSession(reader, 1), EditSession(reader, 2)
     edit(session, start(100, 1))
     used = budget.used()
-    assert used["pictures"] == 100 * 100 * RENDERED_PIXEL_BYTES and used["scenes"] and used["documents"]
+    assert used["pictures"] == 100 * HEIGHT * RENDERED_PIXEL_BYTES and used["scenes"] and used["documents"]
     with pytest.raises(TooLarge, match="SUNBOX_MEMORY"):
         edit(session, start(300, 2))
     with pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
@@ -222,7 +225,7 @@ def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
     assert budget.used()["pictures"] == used["pictures"]
     edit(session, start(50, 3))
     edit(other, start(120, 2))
-    assert budget.used()["pictures"] == 170 * 100 * RENDERED_PIXEL_BYTES
+    assert budget.used()["pictures"] == 170 * HEIGHT * RENDERED_PIXEL_BYTES
     session.close()
     other.close()
     assert sum(budget.used().values()) - reader.caches.bytes == 0

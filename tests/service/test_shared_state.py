@@ -258,7 +258,7 @@ def _children(folder: Path) -> Hammer:
     class Stand:
         """In place of a child that is there already."""
 
-        is_spent, given, process = False, 0, SimpleNamespace(poll=lambda: None)
+        is_spent, given, process, own_bytes = False, 0, SimpleNamespace(poll=lambda: None), lambda child: 0
 
         def __init__(self) -> None:
             self.mine = threading.Lock()

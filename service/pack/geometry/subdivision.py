@@ -6,6 +6,8 @@ also across a seam of texture coordinates, where each has vertices of its own.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 CUT_ONE, CUT_TWO, CUT_THREE = range(1, 4)
@@ -16,12 +18,13 @@ class TooManyTriangles(Exception):
 
 
 def subdivided(
-    rows: np.ndarray, faces: np.ndarray, axes: np.ndarray, max_edge: float, room: int
-) -> tuple[np.ndarray, np.ndarray]:
+    rows: np.ndarray, faces: np.ndarray, axes: np.ndarray, max_edge: float, room: int,
+    grows: Callable[[int], None] = lambda count: None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """(rows (n, c), faces (m, 3)) with further vertices in the middle of edges: means of the rows of their ends.
 
-    The first three columns are positions, and lengths are those under the linear map `axes`. Raises TooManyTriangles
-    before more than `room` of them are made.
+    The first three columns are positions, and lengths are those under the linear map `axes`. `grows` is called with
+    the number of triangles before these are there. Raises TooManyTriangles before there are more than `room`.
     """
     done = [np.zeros((0, 3), np.int64)]
     faces = faces.astype(np.int64)
@@ -31,8 +34,10 @@ def subdivided(
         cuts = long.sum(axis=1)
         done.append(faces[cuts == 0])
         faces, long, cuts = faces[cuts > 0], long[cuts > 0], cuts[cuts > 0]
-        if sum(map(len, done)) + len(faces) + int(cuts.sum()) > room:
+        count = sum(map(len, done)) + len(faces) + int(cuts.sum())
+        if count > room:
             raise TooManyTriangles
+        grows(count)
         middles, rows = _cut(rows, faces, long)
         faces = _pieces(faces, middles, cuts, moved(rows[:, :3], axes))
     return rows, np.concatenate(done)

@@ -20,8 +20,10 @@ from service.scene import Scene
 from service.scene.texture import (
     ImageTexture,
 )
+from service.system.memory import takes
 
 MAX_TEXELS = 2**27  # the texels of a texture of 16384 rows on the device
+LEVELS_8BIT, LEVELS_FLOAT = 9, 20  # bytes for each texel while the levels of its image are made; measured
 AT_ONCE = 2  # images that are read at a time, as `AssetLimits` has as many parsers
 
 
@@ -80,10 +82,28 @@ def lay_out(
             raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
         room, device_room = room - width * height, device_room - whole
     images = {kept: image for kept, (_, image) in wanted.items()}
-    if cache is None or not images or not all(map(lasting, images)):
+
+    def made() -> PackedTexels:
+        takes("texels", _needed(images, averaged))
         return _laid(images, averaged)
+
+    if cache is None or not images or not all(map(lasting, images)):
+        return made()
     key = tuple((kept, averaged.get(kept)) for kept in images)
-    return cache.get(("texels", key), lambda: _laid(images, averaged))
+    return cache.get(("texels", key), made)
+
+
+def _needed(images: Mapping[str, ImageData], averaged: Mapping[str, Texels]) -> int:
+    """The bytes that laying out images takes, with what the levels of some take while they are made."""
+    total, working = 0, [0] * AT_ONCE
+    for kept, image in images.items():
+        height, width, channels = image.pixels.shape
+        texels, value = width * height, 1 if image.is_8bit else 4
+        total += 4 * value * texels + (value * channels * texels if kept.endswith(DECODED) else 0)
+        if kept in averaged:
+            total += 4 * value * level_texels(width, height)
+            working.append((LEVELS_8BIT if image.is_8bit else LEVELS_FLOAT) * texels)
+    return total + sum(sorted(working)[-AT_ONCE:])
 
 
 def _laid(images: dict[str, ImageData], averaged: Mapping[str, Texels]) -> PackedTexels:

@@ -28,7 +28,7 @@ from service.renderers.local.keeper import Keeper
 from service.renderers.local.process import Cause, RendererProcess, Start
 from service.renderers.local.restarts import BY_OTHERS
 from service.renderers.replay_log import ReplayLog
-from service.renderers.statistics import Kind, Statistics
+from service.renderers.statistics import Held, Kind, Statistics
 from service.renderers.task import Task
 from service.system.background import reported
 from service.system.executors import tending
@@ -227,8 +227,8 @@ class Tasks:
     def _account(self, usage: Usage) -> None:
         statistics = self._statistics
         statistics.samples += usage.samples
-        statistics.tasks, statistics.gpu_bytes = usage.tasks, usage.bytes
-        statistics.kernels, statistics.kernels_evicted = usage.kernels, statistics.kernels_evicted + usage.evicted
+        statistics.held = Held(usage.tasks, usage.bytes, usage.resting, usage.kernels)
+        statistics.kernels_evicted += usage.evicted
         for number, seconds in usage.gpu_s.items():
             task = self.by_number.get(number)
             if task is not None:

@@ -24,7 +24,6 @@ from service.renders.queue import RenderQueue
 from service.renders.recent import RECENT_S
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
-from service.requests.request_reader import weight
 from service.storage.asset_access import NO_USES
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
@@ -41,7 +40,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 PIXELS = SETTINGS.width * SETTINGS.height
 PICTURE = PIXELS * (RENDERED_PIXEL_BYTES + SAVED_PIXEL_BYTES)
-SCENE = 2 * weight(PACKED)
+SCENE = 2 * PACKED.bytes
 
 
 def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_path: Path, impatient: None) -> None:
