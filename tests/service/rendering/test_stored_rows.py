@@ -22,9 +22,10 @@ from service.storage.data_check import Report
 from service.storage.database import FILE
 from service.storage.documents import Documents
 from service.storage.stores import storage
+from tests.calls import status
 from tests.marks import seldom
 from tests.service import frozen
-from tests.serving import Server
+from tests.serving import Server, wait_until
 
 WITH_RENDERS = [name for name in frozen.NAMES if (frozen.FOLDERS / name / "renders").exists()]
 STATES = {"gone": "done", "done": "done", "cancelled": "cancelled", "failed": "failed", "running": "running"}
@@ -168,8 +169,10 @@ def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, 
         assert served.http.get(f"/v1/renders/{ids['gone']}").status_code == 410
         cancelled = served.http.get(f"/v1/renders/{ids['cancelled']}").raise_for_status().json()
         assert cancelled["state"] == "failed" and "not whole JSON" in cancelled["problem"]["detail"]
-        for label in ("done", "running", "queued"):
-            ended = served.http.get(f"/v1/renders/{ids[label]}?wait=30").raise_for_status().json()
+        whole = ("done", "running", "queued")
+        wait_until(lambda: all(status(served.http, ids[label], wait=30)["state"] == "done" for label in whole))
+        for label in whole:
+            ended = served.http.get(f"/v1/renders/{ids[label]}").raise_for_status().json()
             assert (ended["state"], ended["label"]) == ("done", label)
             assert served.http.get(f"/v1/renders/{ids[label]}/image?format=npy").status_code == 200
         for id in batches:
