@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import logging
+import os
+import re
 import sqlite3
+import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -13,6 +16,7 @@ from typing import Any
 import pytest
 
 from gpu import Renderer
+from service.batches.batch import member_id
 from service.commands.check_data import check_renders
 from service.config import Config
 from service.ipc.messages import Progress
@@ -25,7 +29,7 @@ from service.storage.stores import storage
 from tests.calls import status
 from tests.marks import seldom
 from tests.service import frozen
-from tests.serving import Server, wait_until
+from tests.serving import Server, served, wait_until
 
 WITH_RENDERS = [name for name in frozen.NAMES if (frozen.FOLDERS / name / "renders").exists()]
 STATES = {"gone": "done", "done": "done", "cancelled": "cancelled", "failed": "failed", "running": "running"}
@@ -180,3 +184,38 @@ def test_a_server_goes_on_with_every_released_revision_s_renders(gpu: Renderer, 
             assert (ended["state"], ended["counts"]["done"]) == ("done", 3)
     finally:
         assert served.stop() == 0
+
+
+@pytest.mark.slow  # a server of its own, and a minute for its folder
+def test_fifty_thousand_ended_renders_take_rows_and_no_objects(tmp_path: Path) -> None:
+    folder, each = frozen.opened("11", tmp_path / "data"), 10_000
+    picture = next((folder / "renders").glob("*.picture"))
+    with closing(sqlite3.connect(folder / FILE)) as file, file:
+        batch = list(file.execute("SELECT * FROM batches").fetchone())
+        done = list(file.execute("SELECT * FROM renders WHERE label = 'done'").fetchone())
+        names = [column[1] for column in file.execute("PRAGMA table_info(renders)")]
+        file.executescript("DELETE FROM renders; DELETE FROM batches; DELETE FROM render_keys")
+        done[names.index("ended_at")] = time.time()
+        for number in range(5):
+            batch[:2], batch[6] = [number + 1, f"{number:024x}ffffffff"], each
+            file.execute(f"INSERT INTO batches VALUES ({', '.join('?' * len(batch))})", batch)
+            for step in range(each):
+                id = member_id(batch[1], step)
+                done[:2], done[-2:] = [number * each + step + 1, id], [number + 1, step]
+                file.execute(f"INSERT INTO renders VALUES ({', '.join('?' * len(done))})", done)
+                os.link(picture, folder / "renders" / f"{id}.picture")
+    picture.unlink()
+    with served(tmp_path, SUNBOX_API_KEY="anna", SUNBOX_KEEP_RENDERS="10000") as server:
+        server.http.headers.update(frozen.KEY)
+        for number in range(5):
+            found = server.http.get(f"/v1/batches/{number:024x}ffffffff").raise_for_status().json()
+            assert (found["state"], found["counts"]["done"]) == ("done", each)
+        assert server.http.get(f"/v1/renders/{id}/image?format=npy").status_code == 200
+        assert resident(server.process.pid) < 150e6
+
+
+def resident(pid: int) -> int:
+    """The bytes of memory of one process, what it shares counted in part."""
+    found = re.search(r"^Pss: +(\d+) kB", Path(f"/proc/{pid}/smaps_rollup").read_text(), re.MULTILINE)
+    assert found is not None
+    return int(found[1]) << 10
