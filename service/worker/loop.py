@@ -251,6 +251,7 @@ class Loop:
         if (assistant := self._assistants.pop(number, None)) is not None:
             self._traced -= assistant.traced
             assistant.release()
+            self._renderer.let_go()
         elif (question := self._questions.pop(number, None)) is not None:
             question.release()
         elif number in self._tasks:
