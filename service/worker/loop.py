@@ -47,7 +47,6 @@ REPORT_S = 0.25  # between two accounts of the GPU time that was used
 # can; but the driver may have dropped what that compiled.
 COMPILING_S = 300.0
 
-
 log = logging.getLogger(__name__)
 
 
