@@ -30,7 +30,7 @@ class Loading:
     def check(self) -> None:
         """Raise Unavailable before it is done."""
         if not self._done.is_set():
-            raise Unavailable("The server is loading what is stored of renders.", RETRY_S)
+            raise Unavailable("The server is still loading its stored renders.", RETRY_S)
 
     async def wait(self, seconds: float) -> None:
         """Return when it is done. Raises Unavailable after that time."""
