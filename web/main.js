@@ -14,6 +14,7 @@ import { LastPicture, subject } from "./panels/last-picture.js";
 import { LobeOnDemand } from "./lobe/on-demand.js";
 import { Announcer, Messages } from "./panels/messages.js";
 import { Outliner } from "./panels/outliner.js";
+import { Paced } from "./lib/paced.js";
 import { entire } from "./document/outline.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
@@ -36,6 +37,7 @@ import { forgetWork, keepWork } from "./document/work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
 const SAVE_REST_MS = 600;
+const KEPT_REST_MS = 5000; // between two pictures that are kept for the next visit
 const PATIENCE_MS = 3000;
 
 const find = (id) => document.getElementById(id);
@@ -112,7 +114,7 @@ const viewport = new Viewport(find("picture"), {
     comparison.now?.painted();
     if (ui.state.tab === "render") finals.now?.show();
     tellState();
-    keepPicture();
+    if (isWorthKeeping()) keeping.ask();
     if (!isFirst) return;
     performance.mark("first picture");
     begin();
@@ -120,14 +122,19 @@ const viewport = new Viewport(find("picture"), {
   },
 });
 
-function keepPicture() {
+// Not a preview, and of what the editor has now.
+function isWorthKeeping() {
   const { header, isWaiting, painted } = page;
-  const { scene, chosen } = editor.state;
-  if (header.scale < 1 || isWaiting || !stream.isNewest(painted)) return;
-  if (ui.state.layer !== "color" || compared(editor.state)) return;
-  const builtIn = editor.canUndo || left ? null : name;
-  lastPicture.keep(viewport.canvas, () => subject({ scene, hidden: chosen.hidden }, builtIn));
+  if (header.scale < 1 || isWaiting || !stream.isNewest(painted)) return false;
+  return ui.state.layer === "color" && !compared(editor.state);
 }
+
+const keeping = new Paced(KEPT_REST_MS, () => {
+  if (!isWorthKeeping()) return; // another picture is on its way, and asks again
+  const { scene, chosen } = editor.state;
+  const builtIn = editor.canUndo || left ? null : name;
+  return lastPicture.keep(viewport.canvas, subject({ scene, hidden: chosen.hidden }, builtIn));
+});
 
 const stream = new Stream({
   hello(info, isTakenUp) {

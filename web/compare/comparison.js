@@ -4,6 +4,7 @@
 import { amount } from "../lib/format-text.js";
 import { kindOf } from "../lib/files.js";
 import { element } from "../lib/dom.js";
+import { Paced } from "../lib/paced.js";
 import { ASKED, MODES, PHOTO, compared, gainOf, modeOf, placed, sidesOf } from "../document/variants.js";
 import { CompareBar } from "./bar.js";
 import { sideOf } from "./sides.js";
@@ -20,7 +21,7 @@ const percent = (x) => `${(100 * x).toFixed(2)} %`;
 
 export class Comparison {
   #open = new Map(); // by name: what stands at the sides
-  #differed = 0;
+  #differences = new Paced(DIFFERENCE_MS, () => this.#compare());
   #photograph = null;
   #wanted = null; // of the page's own stream, while something is compared
 
@@ -278,18 +279,10 @@ export class Comparison {
 
   // After a frame of either: the difference and its measure follow at their own pace.
   painted() {
-    if (!this.isOn || this.timer) return;
-    this.timer = setTimeout(
-      () => {
-        this.timer = null;
-        this.#compare();
-      },
-      Math.max(0, this.#differed + DIFFERENCE_MS - performance.now()),
-    );
+    if (this.isOn) this.#differences.ask();
   }
 
   #compare() {
-    this.#differed = performance.now();
     if (!this.isOn || !this.#compared) return;
     for (const side of this.#open.values()) side.settle();
     if (ASKED.includes(this.#mode)) {

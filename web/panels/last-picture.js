@@ -5,7 +5,6 @@ import { recall, remember } from "../lib/browser-storage.js";
 const NAME = "last picture ";
 const WORK = "work"; // a scene that was changed; a built-in one has its own name
 const LONGEST = 480; // pixels of the longer side, which is enough for what is out of focus
-const REST_MS = 5000; // between two pictures that are kept
 const FADE_MS = 300; // until the first frame covers it
 
 // What a picture is of: {name, of}; `builtIn` is the name of a built-in scene as it comes, else null.
@@ -13,7 +12,6 @@ export const subject = ({ scene, hidden = [] }, builtIn) =>
   builtIn === null ? { name: WORK, of: JSON.stringify([scene, hidden]) } : { name: builtIn, of: "" };
 
 export class LastPicture {
-  #keptAt = -REST_MS;
   #isOver = false;
 
   // `image` lies under the picture; `label` says what is waited for.
@@ -42,14 +40,11 @@ export class LastPicture {
     }, FADE_MS);
   }
 
-  // Keeps the canvas for the next visit, as a picture of what `subject()` says, from time to time.
-  async keep(canvas, subject) {
-    if (performance.now() < this.#keptAt + REST_MS) return;
-    this.#keptAt = performance.now();
+  // Keeps the canvas for the next visit, as a picture of a subject.
+  async keep(canvas, { name, of }) {
     const zoom = Math.min(1, LONGEST / Math.max(canvas.width, canvas.height));
     const small = new OffscreenCanvas(Math.ceil(canvas.width * zoom), Math.ceil(canvas.height * zoom));
     small.getContext("2d").drawImage(canvas, 0, 0, small.width, small.height);
-    const { name, of } = subject();
     await remember(NAME + name, { of, blob: await small.convertToBlob({ type: "image/webp", quality: 0.8 }) });
   }
 }

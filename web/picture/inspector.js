@@ -2,6 +2,7 @@
 
 import { element } from "../lib/dom.js";
 import { hex, toLinear } from "../lib/color.js";
+import { Paced } from "../lib/paced.js";
 
 const FRESH_MS = 800; // between two readings of the linear picture while it gets better
 const MOST = 64;
@@ -15,8 +16,7 @@ export class Inspector {
   #y = 0;
   #at = null; // 0..1 in the picture
   #raw = null;
-  #reading = false;
-  #readAt = 0;
+  #reading = new Paced(FRESH_MS, () => this.#read());
 
   // `places`: {stage, sheet, probe, crosshair}.
   constructor(places, viewport, stream) {
@@ -30,7 +30,7 @@ export class Inspector {
     if (on === this.active) return;
     this.active = on;
     this.probe.hidden = !on;
-    this.#raw = null;
+    this.forget();
     if (!on) this.#place(1, 0, 0);
     else this.#at ??= { x: 0.5, y: 0.5 };
     this.crosshair.hidden = !on;
@@ -99,26 +99,27 @@ export class Inspector {
   }
 
   // After each frame: the linear values follow at their own pace.
-  async refresh() {
+  refresh() {
     if (!this.active) return;
     this.#tell();
-    if (this.#reading || performance.now() - this.#readAt < FRESH_MS) return;
-    this.#reading = true;
+    this.#reading.ask();
+  }
+
+  async #read() {
+    if (!this.active) return;
     try {
       const { header, bytes } = await this.stream.capture({ format: "rgba32f", aov: "color", quality: null });
       this.#raw = { floats: new Float32Array(bytes), width: header.width, height: header.height };
     } catch {
       this.#raw = null; // the connection was lost, and says so itself
     }
-    this.#readAt = performance.now();
-    this.#reading = false;
     this.#tell();
   }
 
   // The picture of before is worth nothing any more.
   forget() {
     this.#raw = null;
-    this.#readAt = 0;
+    this.#reading.hurry();
   }
 
   #tell() {

@@ -8,12 +8,12 @@ import { Picks } from "./picks.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { HANDLED } from "../document/ui-state.js";
 import { lampsOf } from "../document/lamps.js";
+import { Paced } from "../lib/paced.js";
 
 const OVERLAY_MS = 200; // between two histograms
 
 export class Tools {
-  #overlaid = 0;
-  #timer = null;
+  #overlays = new Paced(OVERLAY_MS, () => this.#drawOverlays());
 
   // As ViewportController has them: `find(id)` elements, `acts` the editor, `ui`, `stream`, `viewport`; `say(text)`,
   // `complain(error)`.
@@ -70,17 +70,14 @@ export class Tools {
   overlay() {
     const { histogram, clipping, guides } = this.ui.state;
     if (guides) fitGuides(this.find("guides"), this.root, this.viewport.canvas);
-    if ((!histogram && !clipping) || this.#timer) return;
-    this.#timer = setTimeout(
-      () => {
-        this.#timer = null;
-        this.#overlaid = performance.now();
-        const image = this.viewport.pixels();
-        if (histogram) drawHistogram(this.find("histogram"), image);
-        if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
-      },
-      Math.max(0, this.#overlaid + OVERLAY_MS - performance.now()),
-    );
+    if (histogram || clipping) this.#overlays.ask();
+  }
+
+  #drawOverlays() {
+    const { histogram, clipping } = this.ui.state;
+    const image = this.viewport.pixels();
+    if (histogram) drawHistogram(this.find("histogram"), image);
+    if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
   }
 
   async placeHighlight(place, aspect) {
