@@ -12,7 +12,7 @@ from tests.web.editor import Editor
 
 
 class Slow:
-    """Frames of a server that takes its time: all pass, only previews, or none."""
+    """Frames of a server that takes its time: all pass, all as previews, or none."""
 
     def __init__(self, editor: Editor) -> None:
         self.passing = "all"
@@ -23,10 +23,13 @@ class Slow:
 
         def hear(data: str | bytes) -> None:
             if isinstance(data, bytes) and self.passing != "all":
-                header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
-                if self.passing == "none" or header["scale"] == 1:
+                end = 4 + int.from_bytes(data[:4], "little")
+                header = json.loads(data[4:end])
+                if self.passing == "none":
                     server.send(json.dumps({"type": "ack", "seq": header["seq"]}))
                     return
+                told = json.dumps(header | {"scale": 0.5}).encode()  # a quick machine makes none of its own
+                data = len(told).to_bytes(4, "little") + told + data[end:]
             route.send(data)
 
         server.on_message(hear)
