@@ -54,7 +54,8 @@ def rendering(gpu: Renderer) -> Iterator[Rendering]:
         supervisor = supervisors[checkpoint_s]
         await supervisor.ready(PATIENCE_S)
         try:
-            await test(supervisor)
+            async with asyncio.timeout(PATIENCE_S):
+                await test(supervisor)
         finally:
             for task in list(supervisor.tasks):
                 supervisor.drop(task)

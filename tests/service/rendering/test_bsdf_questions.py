@@ -30,7 +30,9 @@ UP = np.array([[0.0, 0.0, 1.0]])
 SHORT = EvaluateBsdf(0, "values", GREY, UP, UP)
 # Its kernel takes LLVM longest, so that pictures are seen meanwhile whatever else the machine does.
 DEAR = EvaluateBsdf(0, "values", pack_material(OpenpbrMaterial(type="openpbr")), UP, UP)
-LONG = EvaluateBsdf(0, "albedo", GREY, np.repeat(UP, 64, axis=0), UP[:0], samples=1 << 20)
+LONG = EvaluateBsdf(
+    0, "albedo", GREY, np.repeat(UP, 4096, axis=0), UP[:0], samples=1 << 20
+)  # 20 s of two quick cores
 
 # The kernels of `openpbr` take as long as all others together; a record of `measured` that is all zeros, as that of a
 # bare material, cannot be sampled.
@@ -133,6 +135,7 @@ def test_who_goes_away_takes_the_question_along(rendering: Rendering) -> None:
         used = supervisor.statistics.gpu_s
         before = used["bsdf"]
         while used["bsdf"] < before + 0.3:
+            assert not long.done()
             await asyncio.sleep(0.05)
         long.cancel()
         with suppress(asyncio.CancelledError):
