@@ -323,7 +323,16 @@ function push() {
   tellState();
 }
 
-let saving = 0;
+let saving = null;
+function save() {
+  clearTimeout(saving);
+  saving = null;
+  keepWork(essence(editor.steady));
+}
+addEventListener("pagehide", () => {
+  if (saving !== null) save(); // what changed just before the page goes
+});
+
 function refresh() {
   page.resolve();
   panel.show(editor.state, page.knobs);
@@ -339,7 +348,7 @@ function refresh() {
   controller.mark();
   lobe.refresh();
   clearTimeout(saving);
-  if (editor.canUndo || left) saving = setTimeout(() => keepWork(essence(editor.steady)), SAVE_REST_MS);
+  saving = editor.canUndo || left ? setTimeout(save, SAVE_REST_MS) : null;
 }
 
 function showUi() {
