@@ -27,9 +27,9 @@ STATE = """async () => {
 }"""
 
 
-# How far a picture is, and how long that took.
-PROGRESS = re.compile(r'[a-z]+ id="(preparing|preview|samples|noise|left|rate|elapsed|progress)"')
-CHANCE = re.compile(r'blob:[^"]+|(?<=[a-z])-\d+(?=[-" ])')
+# How far a picture is, how long that took, and what a render would take by that.
+PROGRESS = re.compile(r'[a-z]+ id="(preparing|preview|samples|noise|left|rate|elapsed|progress)"|span class="price"')
+CHANCE = re.compile(r'blob:[^"]+|(?<=[a-z])-\d+(?=[-" ])|(?<=Clean) in about .*?(?=[.]"|[.]$)')
 WAITED = "sunbox.preparing"  # what a page keeps of it where it was long
 KEPT = """async () => [
     localStorage.length, sessionStorage.length, document.cookie, (await indexedDB.databases()).length,
