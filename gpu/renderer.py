@@ -61,9 +61,9 @@ class Renderer:
         _check(arrays)
         return Scene(self.context, arrays, editing, self._shared, everything, raised)
 
-    def load_fallback(self, arrays: SceneArrays, raised: frozenset[str] | None = None) -> Scene:
-        """Upload a scene for a kernel of `fallback`, which must be able to show it: the superset kernel with the
-        flags `raised`, or the one for many scenes. Images that it shares with other scenes are uploaded once.
+    def load_fallback(self, arrays: SceneArrays, raised: frozenset[str]) -> Scene:
+        """Upload a scene for the kernel of `fallback` with the flags `raised`, which must be able to show it. Images
+        that it shares with other scenes are uploaded once.
 
         Raises SceneTooLarge, OutOfMemory.
         """

@@ -1,4 +1,4 @@
-"""What a scene's own kernel saves beside the one for many scenes: measured, on the scene itself."""
+"""What a scene's own kernel saves beside one with every common flag on: measured, on the scene itself."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gpu.arrays import SceneArrays
-from gpu.precompile import fallback
 from gpu.settings import RenderSettings
 
 if TYPE_CHECKING:
@@ -39,9 +38,7 @@ class KernelCost:
 def kernel_cost(renderer: Renderer, arrays: SceneArrays) -> KernelCost:
     """Compile both kernels and render small pictures with them in turns, so that both run under the same load."""
     settings = RenderSettings(_SIZE, _SIZE)
-    general = fallback.kernel_key(arrays, settings) is not None
-    full = renderer.load_fallback(arrays) if general else renderer.load(arrays, everything=True)
-    scenes = [renderer.load(arrays), full]
+    scenes = [renderer.load(arrays), renderer.load(arrays, everything=True)]
     pictures = [renderer.picture(scene, settings) for scene in scenes]
     best, spent = [math.inf, math.inf], 0.0
     for _ in range(_TURNS):

@@ -26,7 +26,7 @@ def everything() -> frozenset[str]:
 
 
 def common() -> frozenset[str]:
-    """The flags that a kernel with "everything" has. With the rare ones, too, LLVM takes more than ten minutes and 7 GB."""
+    """The flags that are not rare. A kernel with all flags takes LLVM more than ten minutes and 7 GB."""
     return frozenset(flag.name for flag in FLAGS.values() if flag.in_general)
 
 
@@ -169,8 +169,8 @@ def _quad_lamp(scene: SceneArrays) -> int:
 
 def _shades_once(raised: frozenset[str]) -> bool:
     """Whether a kernel has the BSDF's code once, for lamps and for the path's own direction. Where that is long, LLVM
-    takes a sixth less time then (12 s instead of 32 with a film, 11 instead of 28 with ten models), and samples take no
-    longer, but where paths walk below surfaces. A box of matt walls would gain nothing, and lose 15 %."""
+    takes a sixth less time then (12 s instead of 32 with a film, 11 instead of 28 with ten models), and samples take
+    no longer, but where paths walk below surfaces. A box of matt walls would gain nothing, and lose 15 %."""
     is_longest = "HAS_FILM" in raised or len([m for m in FLAGGED if m.lobes_flag in raised]) > 3
     return is_longest or (needs_tables(raised) and "HAS_WALKS" not in raised)
 

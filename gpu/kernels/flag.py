@@ -34,7 +34,7 @@ class Flag:
     previewed: Asks = lambda scene: False
     # Kernels that evaluate a material alone have it, as it costs a curve no time that anybody would notice.
     evaluated_with: tuple[str, ...] = ()
-    in_general: bool = True  # the kernel for many scenes supports it
+    in_general: bool = True  # it is not rare: a kernel with everything has it
     spares: bool = False  # it saves work and changes no picture, so that no edit waits for the compiler to raise it
     of_camera: bool = False  # the camera alone decides
     of_settings: bool = False  # kernels have no code by this name: with a setting it decides on another define

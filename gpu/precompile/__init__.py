@@ -2,5 +2,5 @@
 
 kernel_keys  everything that the machine code of a kernel depends on, and which kernels an edit will need
 precompiler  a context that only compiles, into the driver's disk cache
-fallback     a scene's superset kernel and one for many scenes, for a scene whose own kernel is still being compiled
+fallback     a scene's superset kernel, for a scene whose own kernel is still being compiled
 """

@@ -1,13 +1,8 @@
-"""Kernels that serve while a scene's own is compiled: a scene's superset kernel, and one for many scenes.
+"""Kernels that serve while an edited scene's own is compiled: its superset kernel, and the least one that shows it.
 
-The superset kernel of a scene has the numbers of its shapes and materials compiled in, as the scene's own has, and
-the flags on that a slider of the scene could raise, but for those of rare features. Its samples take 1.1 to 1.6 times
-as long as those of the own one, and it compiles in 2 to 4 s (llvmpipe, the built-in scenes).
-
-The kernel for many scenes has every flag on but those of features that are rare or would cost too much, and reads the
-numbers of shapes from the uniforms. So its machine code depends on no scene, only on whether the sides of the
-environment's map are powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to
-compile.
+The superset kernel has the numbers of the scene's shapes and materials compiled in, as the scene's own has, and the
+flags on that a slider of the scene could raise, but for those of rare features. Its samples take 1.1 to 1.6 times as
+long as those of the own one, and it compiles in 2 to 4 s (llvmpipe, the built-in scenes).
 """
 
 from __future__ import annotations
@@ -30,23 +25,22 @@ from gpu.settings import RenderSettings
 _FACES, _CAPS = 6, 2  # quads that a box becomes when it shines, and a cylinder besides its side
 
 
-def flags() -> frozenset[str]:
-    """The flags of the kernel for many scenes."""
-    return features.common()
-
-
 def superset(arrays: SceneArrays) -> frozenset[str]:
     """The flags of the scene's superset kernel: its own, and those that its sliders could raise."""
     raised = features.flags(arrays, True)
     return raised | {f.name for f in FLAGS.values() if beside(f.compiled_with, raised) or f.previewed(arrays)}
 
 
-def defines(raised: frozenset[str] | None = None, arrays: SceneArrays | None = None) -> dict[str, object]:
-    """The defines of the kernel for many scenes, or of the superset kernel with these flags for a scene. The latter
-    depend on no light. Neither passes all layers of a veil in one walk, which takes LLVM half again as long."""
+def least(arrays: SceneArrays) -> frozenset[str]:
+    """The flags without which the scene cannot be shown: neither those of its sliders, nor those that spare work. On
+    the shader ball LLVM takes 0.6 to 0.9 of the time of an edited scene's own kernel."""
+    return features.needed(features.flags(arrays))
+
+
+def defines(raised: frozenset[str], arrays: SceneArrays) -> dict[str, object]:
+    """The defines of the superset kernel with these flags for a scene, which depend on no light. It does not pass all
+    layers of a veil in one walk, which takes LLVM half again as long."""
     clamped = RenderSettings(1, 1, clamp=1.0)
-    if raised is None or arrays is None:
-        return features.defines(flags(), clamped) | features.loops_from_uniforms()
     counts = features.counts(arrays) | {"LIGHT_COUNT": 0, "QUAD_LAMP": -1}
     return features.defines(raised, clamped, counts) | features.SOON
 
@@ -57,15 +51,11 @@ def settings_for(settings: RenderSettings) -> RenderSettings | None:
     return replace(settings, adaptive=False, caustics="paths", filter_glossy=0.0) if known else None
 
 
-def kernel_key(
-    arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str] | None = None
-) -> kernel_keys.KernelKey | None:
-    """The key of the superset kernel with these flags, or of the kernel for many scenes; None where that cannot show
-    such a scene."""
-    compiled = flags() if raised is None else raised
-    if settings_for(settings) is None or features.needed(features.flags(arrays)) - compiled:
+def kernel_key(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]) -> kernel_keys.KernelKey | None:
+    """The key of the superset kernel with these flags; None where that cannot show such a scene."""
+    if settings_for(settings) is None or features.needed(features.flags(arrays)) - raised:
         return None
-    bound = kernel_keys.kernel_key(arrays, settings, compiled).textures
+    bound = kernel_keys.kernel_key(arrays, settings, raised).textures
     return kernel_keys.KernelKey(tuple(defines(raised, arrays).items()), bound)
 
 
@@ -98,16 +88,14 @@ def can_become(old: SceneArrays, new: SceneArrays) -> bool:
 
 
 class FallbackScene(Scene):
-    """A scene whose pictures are made with such a kernel. Made by `Renderer.load_fallback`."""
+    """A scene whose pictures are made with its superset kernel. Made by `Renderer.load_fallback`."""
 
-    def __init__(
-        self, context: Any, arrays: SceneArrays, shared: SharedUploads, raised: frozenset[str] | None
-    ) -> None:
+    def __init__(self, context: Any, arrays: SceneArrays, shared: SharedUploads, raised: frozenset[str]) -> None:
         self._superset = raised
         super().__init__(context, arrays, False, shared)
 
     def _flags(self) -> frozenset[str]:
-        return flags() if self._superset is None else self._superset
+        return self._superset
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         return defines(self._superset, self.arrays)

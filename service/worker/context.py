@@ -11,6 +11,7 @@ from service.ipc.messages import FromRenderer
 from service.worker.device.memory import UNLIMITED, Memory
 from service.worker.helpers.compile_client import CompileClient
 from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.helpers.first_look_client import FirstLookClient
 
 if TYPE_CHECKING:
     from gpu import Renderer
@@ -29,6 +30,7 @@ class WorkerContext:
     send: Callable[[FromRenderer], None]
     denoiser: DenoiseClient
     compiler: CompileClient | None = None  # None: kernels are compiled in the task's own turn
+    first_looks: FirstLookClient | None = None  # None: what waits for its kernel is shown by superset kernels alone
     memory: Memory = field(default_factory=_unlimited)
     # Lets go of a task, by its number: the server keeps the pictures of renders and can bring them back. With it Done
     # and a Checkpoint every `checkpoint_s` seconds bring the picture of a render to the server.

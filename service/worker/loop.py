@@ -35,8 +35,9 @@ from service.worker.context import WorkerContext
 from service.worker.device.memory import Memory
 from service.worker.division.assistant import Assistant
 from service.worker.foreseen import ForeseenKernels
-from service.worker.helpers.compile_client import CompileClient
+from service.worker.helpers.compile_client import CompileClient, compiler_memory
 from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.helpers.first_look_client import FirstLookClient
 from service.worker.scheduler import Scheduler
 from service.worker.task import Task
 
@@ -77,11 +78,15 @@ class Loop:
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
         self._compiler = CompileClient(renderer.info, device, lifeline, foresees)
+        # A GPU's driver has no such choice.
+        looks = foresees and renderer.info["software"] and self._compiler.able
+        self._first_looks = FirstLookClient(device, compiler_memory(renderer.info)) if looks else None
         self._context = WorkerContext(
             renderer,
             self._send,
             self._denoiser,
             self._compiler,
+            self._first_looks,
             self._memory,
             self._forget,
             checkpoint_s,
@@ -107,6 +112,8 @@ class Loop:
             self._take(message)
         self._denoiser.hear()
         self._compiler.hear()
+        if self._first_looks is not None:
+            self._first_looks.hear()
         chosen = self._scheduler.choose(self._everyone)
         if chosen is not None:
             began = time.monotonic()
@@ -129,6 +136,7 @@ class Loop:
         """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
         if wait:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
+            ends += [] if self._first_looks is None else self._first_looks.ends
             waits = [self._compiler.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
             waits += [task.left_s for task in self._tasks.values()]

@@ -47,7 +47,7 @@ class Task:
         if (self._away and not self._later) or phase is Phase.EMPTY:
             return False
         if phase is Phase.COMPILING:
-            return picture.updates.preview.due and not self._paused
+            return picture.updates.previews and not self._paused
         if phase in (Phase.UPDATING, Phase.SAVING) or picture.frames.due:
             return True
         stands = self._paused or picture.frames.denoising.holds or self._held_s
@@ -85,7 +85,7 @@ class Task:
     def bytes(self) -> int:
         """The bytes that it takes on the device."""
         picture = self.picture
-        return picture.residency.bytes + picture.updates.preview.bytes + picture.under_hand.bytes
+        return picture.residency.bytes + picture.updates.bytes + picture.under_hand.bytes
 
     @property
     def rested_since(self) -> float:

@@ -81,7 +81,7 @@ class TaskPicture:
         """Whether a person waits for the first frame of something."""
         updates, pending, interactive = self.updates, self.updates.pending, self.tracker.interactive
         if updates.previews:
-            return updates.preview.scale is None
+            return not updates.previewed
         if pending is not None and (pending.restarts or self.residency.loaded is None):
             return pending.interactive or interactive
         return self.frames.scale is None and interactive
@@ -97,7 +97,7 @@ class TaskPicture:
         such as the picture to go on with."""
         pending = self.updates.pending
         if self.phase is Phase.COMPILING:
-            self.traced += self.updates.preview.step()
+            self.traced += self.updates.trace_preview()
             return
         if pending is not None:
             self.attempted = pending.generation
@@ -266,7 +266,7 @@ class TaskPicture:
         """Send the frame that is wanted, if it would show something new."""
         if self.updates.pending is None:
             return self.frames.answer()
-        seen = self.updates.compiling and self.updates.preview.answer(self.frames.want)
+        seen = self.updates.answer(self.frames.want)
         if seen:
             self.frames.want = None
         return seen
@@ -314,6 +314,6 @@ class TaskPicture:
         self.home.restart()
         first = self.residency.loaded is not None and self.tracker.interactive
         self._scale = self.residency.ladder.first(self.tracker.pixel_s) if first else 1.0
-        seen = self.updates.preview.shown(self.tracker.generation)
+        seen = self.updates.shown(self.tracker.generation)
         if self._scale <= seen:
             self._scale = self.residency.ladder.next(seen, self.tracker.pixel_s)

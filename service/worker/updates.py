@@ -6,20 +6,22 @@ from typing import TYPE_CHECKING
 
 from gpu import CompileError, RenderSettings
 from gpu.precompile import kernel_keys
-from service.ipc.messages import Update
+from service.ipc.messages import Update, Want
 from service.worker.context import WorkerContext
 from service.worker.device.loaded_scene import EditedScene, KernelRequest, edited_scene, kernel_request
 from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
 from service.worker.view.fallback_preview import FallbackPreview
+from service.worker.view.unoptimised_look import UnoptimisedLook
 
 if TYPE_CHECKING:
     from gpu import KernelKey
 
 
 class Updates:
-    """At most one update is pending. While its kernel is compiled, `preview` may show it with another one."""
+    """At most one update is pending. While its kernel is compiled, it may be shown with another one: the superset
+    kernel of the scene that was edited, where that is there already, or a small one without optimisation."""
 
     def __init__(
         self, context: WorkerContext, number: int, client: str, residency: Residency, tracker: ProgressTracker
@@ -27,7 +29,9 @@ class Updates:
         self.pending: Update | None = None
         self.stops = False  # the render ends as soon as the pending update is applied
         self.settings: RenderSettings | None = None  # of the last update that was applied
-        self.preview = FallbackPreview(number, context.send, context.renderer, context.compiler)
+        self._fallback = FallbackPreview(number, context.send, context.renderer, context.compiler)
+        self._unoptimised = UnoptimisedLook(number, context.send, context.first_looks)
+        self._first_looks = context.first_looks
         self._residency, self._tracker, self._compiler, self._client = residency, tracker, context.compiler, client
         self._wait = KernelWait(context.compiler, client)
         # Of the pending update, once it was looked at.
@@ -43,7 +47,29 @@ class Updates:
     @property
     def previews(self) -> bool:
         """Whether there is a slice to trace of what shows the pending update meanwhile."""
-        return self.compiling and self.preview.due
+        return self.compiling and self._fallback.due
+
+    @property
+    def previewed(self) -> bool:
+        """Whether that shows something already."""
+        return self._fallback.scale is not None
+
+    @property
+    def bytes(self) -> int:
+        """The bytes that it takes to show the pending update."""
+        return self._fallback.bytes + self._unoptimised.bytes
+
+    def trace_preview(self) -> int:
+        """Trace a slice of it; how many samples of pixels that were."""
+        return self._fallback.step()
+
+    def answer(self, want: Want | None) -> bool:
+        """Send the frame that is wanted of an update that waits for its kernel, if there is something new to show."""
+        return self.compiling and (self._fallback.answer(want) or self._unoptimised.answer(want))
+
+    def shown(self, generation: int) -> float:
+        """The scale at which that generation was shown before its kernel was there; 0 where it was not."""
+        return max(self._fallback.shown(generation), self._unoptimised.shown(generation))
 
     def join(self, update: Update) -> None:
         """Take an update, unless it changes one that failed: the server will hear of that, and say what it wants."""
@@ -87,18 +113,21 @@ class Updates:
     def _waits_for(self, key: KernelKey, request: KernelRequest, generation: int, watched: bool) -> bool:
         """Whether this kernel is being compiled, which may be shown by another one meanwhile."""
         assert self._wait.compiler is not None
-        shows = watched and not self._wait.compiler.knows(key) and self.preview.can(request)
+        shows = watched and not self._wait.compiler.knows(key)
+        at_once = shows and self._fallback.can(request)
+        soon = shows and not at_once and self._unoptimised.can(request)
         if not self._wait.begin(key):
             return False
-        if not shows:
-            self.preview.release()
-        elif self.preview.generation != generation or not self.preview.shows:
-            self.preview.begin(request, generation)
+        for preview, serves in ((self._fallback, at_once), (self._unoptimised, soon)):
+            if not serves:
+                preview.release()
+            elif preview.generation != generation or not preview.shows:
+                preview.begin(request, generation)
         return True
 
     def applied(self, update: Update) -> None:
         """The pending update was applied, or refused; in the first case the renderer has met its kernel."""
-        self.preview.release()
+        self._release_previews()
         if self._request is not None and self._tracker.generation == update.generation:
             for key in self._request.keys:
                 self._wait.met(key)
@@ -113,9 +142,11 @@ class Updates:
         if self._compiler is not None and self._compiler.foresees and self._tracker.interactive:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
-            first = self.preview.prepare(arrays, settings)  # with which any of them can be shown
+            first = self._fallback.prepare(arrays, settings)  # with which any of them can be shown
             keys = [*first, *([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
             self._compiler.prepare(keys, "soon", self._client, self._foreseen)
+            if self._first_looks is not None:
+                self._first_looks.start()
 
     def _foreseen(self, milliseconds: float) -> None:
         """A foreseen kernel was compiled: nobody waits for it."""
@@ -123,4 +154,8 @@ class Updates:
     def release(self) -> None:
         """Wait for no kernel, and show nothing meanwhile; what is pending stays so."""
         self._wait.forget()
-        self.preview.release()
+        self._release_previews()
+
+    def _release_previews(self) -> None:
+        self._fallback.release()
+        self._unoptimised.release()

@@ -1,30 +1,22 @@
-"""The kernel that shows what waits for its own: the same picture of every scene that it knows, and no wait."""
+"""The superset kernel shows what waits for its own kernel: the same picture of what sliders make of a scene."""
 
 from __future__ import annotations
 
 import asyncio
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, Scene, SceneEdit
-from gpu.kernels import features
 from gpu.precompile import fallback
-from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
+from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.ipc.task_control import Pause
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
-from service.worker.device.loaded_scene import KernelRequest
 from service.worker.helpers.compile_client import records
-from service.worker.view.fallback_preview import FallbackPreview
+from service.worker.view.first_look import FirstLook
 from tests.documents import Shelf
 from tests.gpu.flag_scenes import IMAGES, SCENES
 from tests.marks import seldom
@@ -35,30 +27,10 @@ pytestmark = pytest.mark.exact
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}
-KEPT = 4  # disk caches
-QUICKLY = {"GALLIVM_PERF": "nopt"}  # LLVM optimises nothing, and takes half the time
-AHEAD = """
-from gpu import RenderSettings
-from gpu.precompile import fallback
-from gpu.precompile.precompiler import Precompiler
-from tests.gpu.test_fallback import SCENE, SIZE, arrays_of
-print(Precompiler().compile(fallback.kernel_key(arrays_of(SCENE), RenderSettings(**SIZE)))[1])
-"""
 
 
 def arrays_of(scene: dict[str, Any], images: Any = None) -> Any:
     return pack(parse_scene(scene), images or Shelf()).arrays
-
-
-KNOWN = {name: arrays for name in SCENES if fallback.kernel_key(arrays := arrays_of(SCENES[name], IMAGES), SMALL)}
-
-
-def test_one_kernel_for_all_that_it_knows() -> None:
-    raised = frozenset[str]().union(*(features.flags(arrays) for arrays in KNOWN.values()))
-    assert raised == fallback.flags(), "each flag is in some scene here"
-    found = {fallback.kernel_key(arrays, SMALL) for arrays in KNOWN.values()}
-    sides = {dict((unit, side) for unit, _, _, *side in key.textures)[0][0] for key in found if key}
-    assert len(found) == len(sides) <= 2, "one for environments of each kind"
 
 
 def same_picture(*scenes: Scene, gpu: Renderer) -> None:
@@ -73,12 +45,6 @@ def same_picture(*scenes: Scene, gpu: Renderer) -> None:
         scene.release()
     apart = np.abs(pictures[0] - pictures[1]) > 1e-3 * (pictures[0] + 0.01)
     assert np.isfinite(pictures[1]).all() and apart.mean() < 0.01, "but for paths on which rounding decides"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", KNOWN)
-def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
-    same_picture(gpu.load(KNOWN[name]), gpu.load_fallback(KNOWN[name]), gpu=gpu)
 
 
 @pytest.mark.parametrize("name", ["CHECKERS", "LIGHT_TREE", "SMOOTH_NORMALS"])
@@ -104,7 +70,8 @@ def test_the_superset_kernel_shows_what_sliders_make_of_the_scene(gpu: Renderer,
 
 @pytest.mark.slow
 def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
-    scene = gpu.load_fallback(KNOWN["PRINCIPLED"])
+    arrays = arrays_of(SCENES["PRINCIPLED"], IMAGES)
+    scene = gpu.load_fallback(arrays, fallback.superset(arrays))
     means = []
     for clamp in (None, 1e6, 1e-3):
         picture = gpu.picture(scene, RenderSettings(24, 16, max_bounces=3, clamp=clamp))
@@ -116,12 +83,22 @@ def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
 
 
 def test_what_it_does_not_know() -> None:
-    assert fallback.kernel_key(arrays_of(SCENES["CHECKERS"], IMAGES), SMALL) is None
-    known = KNOWN["SPHERES"]
-    for other in ({"estimator": "light"}, {"sampler": "independent"}):
-        assert fallback.kernel_key(known, RenderSettings(24, 16, **other)) is None
+    known, other = arrays_of(SCENES["SPHERES"], IMAGES), arrays_of(SCENES["CHECKERS"], IMAGES)
+    superset = fallback.superset(known)
+    assert fallback.kernel_key(other, SMALL, superset) is None
+    for unknown in ({"estimator": "light"}, {"sampler": "independent"}):
+        assert fallback.kernel_key(known, RenderSettings(24, 16, **unknown), superset) is None
     adaptive = RenderSettings(24, 16, adaptive=True)
-    assert fallback.kernel_key(known, adaptive) is not None and not fallback.settings_for(adaptive).adaptive  # type: ignore[union-attr]
+    assert fallback.kernel_key(known, adaptive, superset) is not None
+    assert not fallback.settings_for(adaptive).adaptive  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_least_kernel_has_no_flag_that_its_scene_can_do_without(name: str) -> None:
+    arrays = arrays_of(SCENES[name], IMAGES)
+    least = fallback.least(arrays)
+    assert fallback.kernel_key(arrays, SMALL, least) is not None
+    assert all(fallback.kernel_key(arrays, SMALL, least - {flag}) is None for flag in least)
 
 
 def test_what_an_edit_tells_it() -> None:
@@ -149,56 +126,29 @@ async def shown(supervisor: Supervisor, ears: Ears, task: int, generation: int) 
             supervisor.send(Want(task, serial, View(encoding="linear")))
 
 
-def compiled_ahead(digest: str) -> Path:
-    """A disk cache of the driver's that holds the kernel for SCENE, as made ahead of need. That takes two minutes
-    on llvmpipe, so the caches of the last versions of the kernel are kept for later runs."""
-    folder = records().parent / "tests" / digest
-    if not folder.exists():
-        making = folder.with_suffix(f".{os.getpid()}")
-        making.mkdir(parents=True)
-        environment = os.environ | QUICKLY | {"MESA_SHADER_CACHE_DIR": str(making)}
-        done = subprocess.run([sys.executable, "-c", AHEAD], env=environment, capture_output=True, text=True)
-        assert done.stdout.strip() == "True", done.stderr
-        making.rename(folder)
-    for old in sorted(folder.parent.iterdir(), key=lambda path: path.stat().st_mtime)[:-KEPT]:
-        shutil.rmtree(old)
-    return folder
-
-
-def test_a_first_look_reports_its_noise(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_first_look_reports_its_noise(gpu: Renderer) -> None:
     """From its second sample on, as every picture does; here by the scene's own kernel."""
     sent: list[Any] = []
-    preview = FallbackPreview(1, sent.append, gpu, cast(Any, SimpleNamespace(met=lambda key: None)))
-    wanted = cast(KernelRequest, SimpleNamespace(arrays=arrays_of(SCENE), settings=RenderSettings(64, 64)))
-    monkeypatch.setattr(preview, "_compiled", lambda wanted: SimpleNamespace(key=None, raised=None))
-    monkeypatch.setattr(gpu, "load_fallback", lambda arrays, raised: gpu.load(arrays))
-    preview.begin(wanted, 1)
+    look = FirstLook(1, sent.append, gpu)
+    look.begin(gpu.load(arrays_of(SCENE)), RenderSettings(64, 64), 1)
     for _ in range(4):
-        preview.step()
-        preview.answer(Want(1, 1, View(), anyway=True))
-    preview.release()
+        look.step()
+        look.answer(Want(1, 1, View(), anyway=True))
+    look.release()
     reports = [frame.progress for frame in sent]
     assert max(report.samples for report in reports) >= 2
     assert all((report.noise is None) == (report.samples < 2) for report in reports)
 
 
-@pytest.mark.slow
-def test_a_stream_sees_at_once_what_is_compiled_for(
-    gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_slider_is_shown_at_once_where_its_superset_kernel_is_there(
+    gpu: Renderer, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """A server that has nothing compiled yet: the scene's superset kernel is made first after the scene is shown."""
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
     arrays = arrays_of(SCENE)
-    wanted = fallback.kernel_key(arrays, RenderSettings(**SIZE))
-    assert wanted is not None
-    digest = wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
-    shutil.copytree(compiled_ahead(digest), tmp_path / "cache")
-    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "cache"))
-    for name, value in QUICKLY.items():
-        monkeypatch.setenv(name, value)
-    # On a busy machine there is no time that nobody else wants, in which the kernel is asked for.
-    (tmp_path / "sitecustomize.py").write_text("import os\nos.sched_setscheduler = lambda *_: None\n")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", os.getcwd())]))
-    record = records() / digest
-    assert not record.exists()
+    superset = fallback.kernel_key(arrays, RenderSettings(**SIZE), fallback.superset(arrays))
+    assert superset is not None
+    record = records() / superset.digest(driver_of(gpu.info))
 
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()

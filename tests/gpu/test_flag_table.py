@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gpu import KernelKey, RenderSettings, SceneArrays
+from gpu import RenderSettings, SceneArrays
 from gpu.bsdf.kernels import ENTRIES
 from gpu.kernels import features
 from gpu.kernels.flag import ANYWHERE, Flag
@@ -52,10 +52,6 @@ def has(keys: Any) -> list[bool]:
 
 def later(scene: SceneArrays) -> list[bool]:
     return has(kernel_keys.keys_after_edit(scene, SETTINGS))
-
-
-def general(scene: SceneArrays) -> KernelKey | None:
-    return fallback.kernel_key(scene, SETTINGS)
 
 
 def test_every_kernel_says_whether_it_has_the_flag(add: Any) -> None:
@@ -112,18 +108,19 @@ def test_curves_have_all_menus(add: Any) -> None:
     assert any(has(kernel_keys.bsdf_keys()))
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_the_kernel_for_many_scenes_may_not_support_it(add: Any, known: bool) -> None:
-    add(in_general=known)
-    assert (NEW in fallback.flags()) == known and general(CHALK) is not None
-    assert (general(open_(CHALK)) is not None) == known
+@pytest.mark.parametrize("common", [False, True])
+def test_a_kernel_with_everything_has_no_rare_code(add: Any, common: bool) -> None:
+    add(in_general=common)
+    assert (NEW in features.common()) == common
 
 
 def test_no_edit_waits_for_what_only_spares_work(add: Any) -> None:
-    add(spares=True, in_general=False)
+    add(spares=True)
     raised = features.flags(CHALK, True)
     assert features.grown(raised, open_(CHALK)) == raised and NEW in features.flags(open_(CHALK))
-    assert general(open_(CHALK)) is not None
+    superset = fallback.superset(CHALK)
+    assert NEW not in superset and fallback.kernel_key(open_(CHALK), SETTINGS, superset) is not None
+    assert NEW not in fallback.least(open_(CHALK))
 
 
 def test_what_the_camera_alone_decides(add: Any) -> None:

@@ -75,7 +75,7 @@ class CompileClient:
         self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
         self._lanes = dict[Priority, Lane]()
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
-        memory = min(MEMORY[info["software"]], machine_memory() // 2)
+        memory = compiler_memory(info)
         given += ["--memory", str(memory)]
         for each in get_args(Priority):
             line = lifeline if each == "now" else None
@@ -155,10 +155,19 @@ class CompileClient:
         """Call those whose kernels are compiled, and begin the next ones."""
         for lane in self._lanes.values():
             self._hear(lane)
+        self._give_way()
 
     def close(self) -> None:
         for lane in self._lanes.values():
             lane.helper.close()
+
+    def _give_way(self) -> None:
+        """Compile nothing for nobody where somebody waits for a kernel: on two cores that took 1.5 times as long."""
+        is_waited_for = self._lanes["now"].key is not None
+        for lane in (self._lanes["soon"], self._lanes["spare"]):
+            lane.pause(is_waited_for)
+            if lane.is_due:
+                self._begin(lane)
 
     def _add(self, lane: Lane, key: KernelKey, done: Done, client: str) -> bool:
         """Queue a kernel or join who waits for it. False: no helper can be started."""
@@ -168,6 +177,7 @@ class CompileClient:
             lane.wanted[key] = {done: client}
             if lane.is_due:
                 self._begin(lane)
+            self._give_way()
         return key in lane.wanted
 
     def _is_compiled(self, key: KernelKey) -> bool:
@@ -240,6 +250,11 @@ class CompileClient:
         if len(self._refused) >= REMEMBERED:
             self._refused.clear()
         self._refused[key] = detail, time.monotonic() + REFUSED_S
+
+
+def compiler_memory(info: dict[str, Any]) -> int:
+    """Bytes that a process may take for kernels, beside its context; `info` is the renderer's."""
+    return min(MEMORY[info["software"]], machine_memory() // 2)
 
 
 def _nobody(milliseconds: float) -> None:

@@ -53,6 +53,7 @@ class Lane:
     limit_s: float  # for one kernel, the process's start included
     memory: int = 0  # bytes that its process may take for kernels, for what is said of one that needs more
     begins: float = 0.0  # by the monotonic clock: nothing is compiled before
+    paused: bool = False
     wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # whom to call, and the client of each
     key: KernelKey | None = None  # the one under way
     until: float = 0.0  # by the monotonic clock: when it takes too long
@@ -67,14 +68,19 @@ class Lane:
     @property
     def left_s(self) -> float | None:
         """How many more seconds a wait makes sense for the kernel under way, or for the first one; None: for none."""
-        if self.key is None and not self.wanted:
+        if self.key is None and (not self.wanted or self.paused):
             return None
         return max(0.0, (self.begins if self.key is None else self.until) - time.monotonic())
 
     @property
     def is_due(self) -> bool:
         """Whether the next kernel can be begun."""
-        return self.key is None and bool(self.wanted) and time.monotonic() >= self.begins
+        return self.key is None and bool(self.wanted) and not self.paused and time.monotonic() >= self.begins
+
+    def pause(self, is_paused: bool) -> None:
+        """Begin no kernel, and stop the process of the one under way."""
+        self.paused = is_paused
+        self.helper.pause(is_paused)
 
     def forget(self, done: Done) -> None:
         for key, callers in list(self.wanted.items()):

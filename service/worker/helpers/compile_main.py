@@ -64,7 +64,7 @@ def main() -> int:
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             ahead = Precompiler(arguments.device)
-            _bound(arguments.memory)
+            bound_memory(arguments.memory)
             channel.send(end, Started())
             while select.select([end], [], [], IDLE_S if priority == "now" else SPARE_IDLE_S)[0]:
                 key = channel.receive(end, wait=True)
@@ -85,7 +85,7 @@ def main() -> int:
     return 0
 
 
-def _bound(memory: int) -> None:
+def bound_memory(memory: int) -> None:
     """Let this process take so many more bytes of memory of its own. Address space is another thing: drivers of GPUs
     reserve more of it than any machine has memory. LLVM ends its process where it gets no more."""
     most = _status("VmData") + memory

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +20,24 @@ ROOT = Path(__file__).parents[3]
 class HelperProcess:
     """Runs `python -m MODULE DESCRIPTOR --parent PID ARGUMENTS`, which may end by itself when idle."""
 
-    def __init__(self, module: str, *arguments: str, lifeline: int | None = None) -> None:
-        """With `lifeline`, a pipe of the server's, it may end something that its parent does not see the end of."""
+    def __init__(
+        self,
+        module: str,
+        *arguments: str,
+        lifeline: int | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """With `lifeline`, a pipe of the server's, it may end something that its parent does not see the end of.
+        `environment` is added to what it inherits."""
         self._module, self._arguments = module, arguments
+        self._environment = environment or {}
         self._passed: list[int] = []
         if lifeline is not None:
             self._passed = [lifeline]
             self._arguments = *arguments, "--lifeline", str(lifeline)
         self._process: subprocess.Popen[bytes] | None = None
         self._end: socket.socket | None = None
+        self._is_paused = False
 
     @property
     def ends(self) -> list[socket.socket]:
@@ -45,11 +56,21 @@ class HelperProcess:
             self.close()
             channel.send(self._begin(), message)
 
+    def start(self) -> None:
+        """Have the process there before the first request. Raises OSError where it cannot start."""
+        self._begin()
+
     def hear(self) -> Any:
         """The next answer. Raises BlockingIOError where there is none, channel.Closed when the process has ended."""
         if self._end is None:
             raise BlockingIOError
         return channel.receive(self._end)
+
+    def pause(self, is_paused: bool) -> None:
+        """Stop the process where it stands, or let it go on."""
+        if self._process is not None and is_paused != self._is_paused:
+            self._process.send_signal(signal.SIGSTOP if is_paused else signal.SIGCONT)
+            self._is_paused = is_paused
 
     def close(self) -> int:
         """End the process, if there is one; its exit code, which is its own where it had ended before."""
@@ -60,6 +81,7 @@ class HelperProcess:
             self._process.kill()
             code = self._process.wait()
         self._end = self._process = None
+        self._is_paused = False
         return code
 
     def _begin(self) -> socket.socket:
@@ -72,7 +94,7 @@ class HelperProcess:
                 self._process = subprocess.Popen(
                     [*command, *self._arguments],
                     pass_fds=[theirs.fileno(), *self._passed],
-                    env=inherited_environment(),
+                    env={**inherited_environment(), **self._environment},
                     cwd=ROOT,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,

@@ -60,6 +60,8 @@ class Helper:
     def ask(self, key: KernelKey) -> None:
         self.asked.append(key)
 
+    def pause(self, is_paused: bool) -> None: ...
+
 
 def test_only_what_somebody_waits_for_is_compiled_without_it(
     gpu: Renderer, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
