@@ -304,8 +304,7 @@ async def _warm(app: FastAPI) -> None:
     if not await warm_up(state.renderers, state.reader, presets.get("scenes", presets.DEFAULT_SCENE)):
         return
     _announce(state.address)
-    scenes = (presets.get("scenes", each["name"]) for each in presets.names("scenes"))
-    await foresee(state.renderers, state.reader, scenes)
+    await foresee(state.renderers, state.reader, *presets.likely())
 
 
 def _announce(address: str) -> None:

@@ -157,12 +157,13 @@ class Update:
 
 @dataclass(frozen=True)
 class Foresee:
-    """Asks for the kernels to be compiled with which a stream would begin this scene and touch its sliders. The task
-    has no other use."""
+    """Asks for the kernels to be compiled with which a stream would begin this scene, or come to it by an edit of the
+    one `before`. The task has no other use."""
 
     task: int
     scene: SceneData
     settings: dict[str, Any]  # the arguments of gpu.RenderSettings
+    before: SceneData | None = None
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,9 @@ from service.problems import NotFound
 
 KINDS = ("scenes", "materials", "environments", "stages")
 DEFAULT_SCENE = "shader-ball"
+SUBJECT = "subject"  # the material that is looked at there
+# A material for each kernel that many of the library need, the most useful first.
+FAVOURITES = ("gold", "skin", "glass", "ceramic", "car-paint", "matte-clay", "jade", "brushed-aluminium")
 
 # Documents that would be long files of numbers.
 COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
@@ -63,6 +66,22 @@ def get(kind: str, name: str) -> dict[str, Any]:
         raise NotFound(f"there is no preset {name[:80]!r} among the {kind}; there are {', '.join(_known(kind))}")
     document: dict[str, Any] = json.loads(_text(kind, name))
     return document
+
+
+def likely() -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]:
+    """What a client is likely to look at: the scene with which the editor begins, that scene of other materials, and
+    the other scenes."""
+    shown = get("scenes", DEFAULT_SCENE)
+    edits = [_dressed(shown, get("materials", name)) for name in FAVOURITES]
+    others = [get("scenes", each["name"]) for each in names("scenes") if each["name"] != DEFAULT_SCENE]
+    return shown, edits, others
+
+
+def _dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
+    """The scene with its subject made of a material of the library, which may be stored with its textures."""
+    (bare,) = material["materials"].values() if "materials" in material else [material]
+    more = {"textures": scene.get("textures", {}) | material["textures"]} if "textures" in material else {}
+    return scene | {"materials": scene["materials"] | {SUBJECT: bare}} | more
 
 
 def default_environment() -> dict[str, Any]:

@@ -17,7 +17,8 @@ from service.renderers.protocol import Renderers
 from service.requests.request_reader import RequestReader
 from service.system.executors import packing
 
-WARM_UP_SETTINGS = {"width": 64, "height": 64}  # a stream's kernel does not depend on its size
+# A stream's kernel does not depend on its size, and of a picture so small there are no first looks meanwhile.
+WARM_UP_SETTINGS = {"width": 16, "height": 16}
 
 log = logging.getLogger(__name__)
 
@@ -61,8 +62,11 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) ->
     return True
 
 
-async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterable[Any]) -> None:
-    """Compile the builders' code, and without hurry the kernels of scenes to which a client may change.
+async def foresee(
+    renderers: Renderers, reader: RequestReader, shown: Any, edits: Iterable[Any], others: Iterable[Any]
+) -> None:
+    """Compile the builders' code, and without hurry the kernels of scenes to which a client may change from the one
+    that is `shown` first: by `edits` of it, or to `others`.
 
     An error is logged and not raised.
     """
@@ -72,7 +76,11 @@ async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterab
     task = renderers.open(_Deaf(), "server")
     try:
         settings = (await packing(partial(reader.settings, WARM_UP_SETTINGS))).for_gpu()
-        for document in documents:
+        first = (await packing(partial(_packed, reader, shown))).arrays
+        for document in edits:
+            packed = await packing(partial(_packed, reader, document))
+            renderers.send(Foresee(task, packed.arrays, settings, before=first))
+        for document in others:
             packed = await packing(partial(_packed, reader, document))
             renderers.send(Foresee(task, packed.arrays, settings))
     except ServiceError as error:

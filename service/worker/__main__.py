@@ -90,8 +90,8 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
             "the processor renders, as this user may not use the GPU",
             {"device": closed[0], "group": closed[0].group()},
         )
-    heartbeat, lifeline, foresees = Heartbeat(arguments.heartbeat), arguments.lifeline, arguments.ahead != "off"
-    Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline, foresees).run()
+    heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
+    Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline, arguments.ahead).run()
     return 0
 
 

@@ -1,40 +1,57 @@
-"""Kernels that are compiled before anything needs them: for scenes with which streams may begin, and for panels."""
+"""Kernels that are compiled for nobody who is there: at the lowest priority, one at a time, and within a bound."""
 
 from __future__ import annotations
 
 from collections import deque
+from math import inf
 
 from gpu import KernelKey
 from gpu.precompile import kernel_keys
 from service.ipc.messages import Foresee
+from service.system.power import has_power_to_spare
 from service.worker.device.loaded_scene import begin_key, slider_keys
 from service.worker.helpers.compile_client import CompileClient
 
+BUDGET_S = 60.0  # of a processor, after a start, for "some"
+LONGEST_S = 10.0  # that one kernel takes: none is begun for which less is left
+
 
 class ForeseenKernels:
-    """Handed to the compiler one at a time, as tasks may soon need others more."""
+    """Handed to the compiler one at a time: those that were used here before, then those of scenes with which a
+    client may begin or go on, then those of panels."""
 
-    def __init__(self, compiler: CompileClient) -> None:
+    def __init__(self, compiler: CompileClient, bounded: bool = True) -> None:
+        """Without a bound the sliders of all these scenes are foreseen, too."""
         self._compiler = compiler
-        self._scenes = deque[KernelKey]()  # with which streams may begin; compiled after those that edits need
-        self._sliders = deque[KernelKey]()  # of those scenes; compiled while nothing is traced
-        self._panels = kernel_keys.bsdf_keys()  # compiled when nothing else is, so that no panel has to wait
+        self._used = compiler.used() if compiler.foresees else iter(())
+        self._scenes = deque[KernelKey]()
+        self._sliders = deque[KernelKey]()
+        self._panels = kernel_keys.bsdf_keys()
+        self._bounded = bounded
+        self._begun = False  # scenes have come: panels are not the first
 
     def add(self, message: Foresee) -> None:
-        """Take a scene with which a stream may begin."""
+        """Take a scene with which a client may begin or go on."""
+        self._begun = True
         self._scenes.append(begin_key(message))
-        self._sliders += slider_keys(message)
+        if not self._bounded:
+            self._sliders += slider_keys(message)
 
-    def prepare(self, idle: bool) -> bool:
-        """Queue one kernel for each priority that has none; whether there was one. `idle`: nothing is traced."""
-        if not self._compiler.foresees:
+    def prepare(self) -> bool:
+        """Hand on a kernel, if it is time for one; whether it was."""
+        compiler = self._compiler
+        budget_s = BUDGET_S - LONGEST_S if self._bounded else inf
+        if not compiler.foresees or not compiler.is_idle("spare") or compiler.spare_s >= budget_s:
             return False
-        handed = False
-        scenes = self._scenes or (self._sliders if idle else None)
-        if scenes and self._compiler.is_idle("soon"):
-            self._compiler.prepare([scenes.popleft()], "soon")
-            handed = True
-        if self._compiler.is_idle("spare") and (key := next(self._panels, None)) is not None:
-            self._compiler.prepare([key], "spare")
-            handed = True
-        return handed
+        if not has_power_to_spare() or (key := self._next()) is None:
+            return False
+        compiler.prepare([key], "spare")
+        return True
+
+    def _next(self) -> KernelKey | None:
+        if (key := next(self._used, None)) is not None:
+            return key
+        for line in (self._scenes, self._sliders):
+            if line:
+                return line.popleft()
+        return next(self._panels, None) if self._begun else None

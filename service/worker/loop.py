@@ -61,9 +61,10 @@ class Loop:
         device: int | None,
         checkpoint_s: float,
         lifeline: int | None = None,
-        foresees: bool = True,
+        ahead: str = "some",
     ) -> None:
-        """`foresees`: kernels are compiled before anybody waits for them."""
+        """`ahead`: how many kernels are compiled before anybody waits for them: off, some or all."""
+        foresees = ahead != "off"
         self._end = end
         self._renderer = renderer
         self._heartbeat = heartbeat
@@ -92,7 +93,7 @@ class Loop:
             checkpoint_s,
             self._scheduler.sharers,
         )
-        self._foreseen = ForeseenKernels(self._compiler)
+        self._foreseen = ForeseenKernels(self._compiler, bounded=ahead != "all")
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = self._resting = 0
         self._reported = 0.0
@@ -126,7 +127,7 @@ class Loop:
                 self._work(task, partial(self._answer, task))
         busy = any(each.ready for each in self._everyone)
         self._account(at_once=not busy)
-        return self._foreseen.prepare(idle=not busy) or busy
+        return self._foreseen.prepare() or busy
 
     @property
     def _everyone(self) -> list[Turns]:

@@ -13,6 +13,7 @@ from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
 from service.worker.view.fallback_preview import FallbackPreview
+from service.worker.view.first_look import is_large
 from service.worker.view.unoptimised_look import UnoptimisedLook
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ class Updates:
             first = self._fallback.prepare(arrays, settings)  # with which any of them can be shown
             keys = [*first, *([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
             self._compiler.prepare(keys, "soon", self._client, self._foreseen)
-            if self._first_looks is not None:
+            if self._first_looks is not None and is_large(settings):
                 self._first_looks.start()
 
     def _foreseen(self, milliseconds: float) -> None:
@@ -154,6 +155,8 @@ class Updates:
     def release(self) -> None:
         """Wait for no kernel, and show nothing meanwhile; what is pending stays so."""
         self._wait.forget()
+        if self._compiler is not None:
+            self._compiler.forget(self._foreseen)
         self._release_previews()
 
     def _release_previews(self) -> None:

@@ -200,6 +200,8 @@ class Instant:
         self.answers += 1
         return Compiled(5.0, cached=True)
 
+    def pause(self, is_paused: bool) -> None: ...
+
 
 def compiling_instantly(gpu: Renderer, priority: Priority) -> tuple[CompileClient, Instant]:
     compiler, helper = CompileClient(gpu.info, None), Instant()

@@ -149,5 +149,5 @@ def test_warming_up_leaves_no_task_and_raises_nothing(
 
 def test_scenes_that_may_follow_are_foreseen() -> None:
     renderers = StandIn(grey(0.5, 64))
-    asyncio.run(foresee(renderers, READER, [readiness.SCENE] * 2))
-    assert renderers.foreseen == 2 and not renderers.open_tasks
+    asyncio.run(foresee(renderers, READER, readiness.SCENE, [readiness.SCENE] * 2, [readiness.SCENE]))
+    assert renderers.foreseen == 3 and not renderers.open_tasks

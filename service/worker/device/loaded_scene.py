@@ -113,9 +113,12 @@ class KernelRequest:
 
 
 def begin_key(foreseen: Foresee) -> KernelKey:
-    """The key of the kernel with which a stream begins a scene."""
+    """The key of the kernel with which a stream begins a scene, or comes to it by an edit of another one."""
     arrays, settings = scene_arrays(foreseen.scene), RenderSettings(**foreseen.settings)
-    return kernel_keys.kernel_key(arrays, settings, kernel_keys.flags(arrays, True))
+    if foreseen.before is None:
+        return kernel_keys.kernel_key(arrays, settings, kernel_keys.flags(arrays, True))
+    raised = kernel_keys.flags(scene_arrays(foreseen.before), True)
+    return kernel_keys.kernel_key(arrays, settings, kernel_keys.flags_after_edit(raised, arrays, True))
 
 
 def slider_keys(foreseen: Foresee) -> list[KernelKey]:

@@ -10,6 +10,7 @@ import logging
 import os
 import socket
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -20,6 +21,7 @@ from service.ipc.messages import driver_of
 from service.system.memory import machine_memory
 from service.worker.helpers.compile_lane import TRIES, Compiled, Done, Lane, Refused
 from service.worker.helpers.process import HelperProcess
+from service.worker.helpers.used_kernels import UsedKernels
 
 if TYPE_CHECKING:
     from gpu import KernelKey
@@ -70,6 +72,7 @@ class CompileClient:
         self._able = self._keeps is not None or _has_cache()
         self._alone_until = 0.0  # by the monotonic clock: no process can be started
         self._records = records()
+        self._used = UsedKernels(cache_folder() / "used.json")
         self._known: set[KernelKey] = set()  # kernels that are compiled, or that the driver does not keep
         self._refused: dict[KernelKey, tuple[str, float]] = {}  # why, and until when it holds
         self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
@@ -92,6 +95,15 @@ class CompileClient:
     def left_s(self) -> float | None:
         """In how many seconds `hear` has to look whether a kernel takes too long; None: there is none under way."""
         return min((left for lane in self._lanes.values() if (left := lane.left_s) is not None), default=None)
+
+    @property
+    def spare_s(self) -> float:
+        """Seconds of a processor that went into kernels that nobody waited for."""
+        return self._lanes["soon"].spent_s + self._lanes["spare"].spent_s
+
+    def used(self) -> Iterator[KernelKey]:
+        """The kernels that pictures were made with on this machine, the latest first."""
+        return self._used.latest_first()
 
     def is_idle(self, priority: Priority) -> bool:
         return not self._lanes[priority].wanted
@@ -136,8 +148,9 @@ class CompileClient:
                 self._add(lane, key, done or _nobody, client)
 
     def forget(self, done: Done) -> None:
-        """Drop one caller's wait; a kernel that nobody waits for is not begun."""
-        self._lanes["now"].forget(done)
+        """Drop what one caller waits for, or had foreseen; a kernel that nobody else wants is not begun."""
+        for lane in self._lanes.values():
+            lane.forget(done)
 
     def met(self, key: KernelKey) -> None:
         """Note that the renderer has this kernel, and so has the driver's disk cache."""
@@ -150,6 +163,8 @@ class CompileClient:
         self._known.add(key)
         self._met.add(key)
         self._record(key)
+        if self.foresees:
+            self._used.note(key)
 
     def hear(self) -> None:
         """Call those whose kernels are compiled, and begin the next ones."""

@@ -38,6 +38,7 @@ class Compiled:
     cached: bool
     detail: str = ""
     resident: int = 0  # bytes that the helper holds now
+    spent_s: float = 0.0  # of a processor since its last answer, or since its start
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ class Lane:
     compiled: int = 0  # kernels, by this process
     killed: dict[KernelKey, int] = field(default_factory=dict)  # how often the process was, at a kernel
     failures: int = 0  # in a row: processes that did not start, and kernels that the driver did not keep
+    spent_s: float = 0.0  # of a processor, by all of its processes
     begun: int = 0
     served: dict[str, int] = field(default_factory=dict)  # by client: the number of its last kernel
 
@@ -124,6 +126,7 @@ class Lane:
             return None
         self.failures = 0 if answer.cached else self.failures + 1
         self.compiled += 1
+        self.spent_s += answer.spent_s
         if self.compiled >= MOST_KERNELS or answer.resident > MOST_RESIDENT:
             self.helper.close()
         return answer

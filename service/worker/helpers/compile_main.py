@@ -66,6 +66,7 @@ def main() -> int:
             ahead = Precompiler(arguments.device)
             bound_memory(arguments.memory)
             channel.send(end, Started())
+            spent_s = 0.0
             while select.select([end], [], [], IDLE_S if priority == "now" else SPARE_IDLE_S)[0]:
                 key = channel.receive(end, wait=True)
                 record = records() / key.digest(arguments.driver)
@@ -79,7 +80,8 @@ def main() -> int:
                 except GpuError as error:
                     compiled = Compiled(0.0, True, str(error))
                 trim()
-                channel.send(end, replace(compiled, resident=_status("VmRSS")))
+                before_s, spent_s = spent_s, time.process_time()
+                channel.send(end, replace(compiled, resident=_status("VmRSS"), spent_s=spent_s - before_s))
         except (channel.Closed, GpuError):
             pass
     return 0

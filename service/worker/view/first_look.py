@@ -33,10 +33,14 @@ class _Content(NamedTuple):
     samples: int
 
 
+def is_large(settings: RenderSettings) -> bool:
+    """Whether a picture can be shown smaller than it is."""
+    return min(settings.width, settings.height) * LARGEST >= SMALLEST_SIDE
+
+
 def serves(wanted: KernelRequest) -> bool:
     """Whether the update is worth a first look: its picture is large enough, and its scene no burden."""
-    large = min(wanted.settings.width, wanted.settings.height) * LARGEST >= SMALLEST_SIDE
-    return large and scene_bytes(wanted.arrays) <= MOST_BYTES
+    return is_large(wanted.settings) and scene_bytes(wanted.arrays) <= MOST_BYTES
 
 
 class FirstLook:

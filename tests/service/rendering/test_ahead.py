@@ -73,7 +73,7 @@ def test_only_what_somebody_waits_for_is_compiled_without_it(
         lane.begins = 0.0
     compiler.prepare(common_keys(), "soon")
     compiler.prepare(common_keys(), "spare")
-    assert not ForeseenKernels(compiler).prepare(idle=True) and helper.asked == []
+    assert not ForeseenKernels(compiler).prepare() and helper.asked == []
     assert compiler.queue(common_keys()[0], lambda milliseconds: None) and helper.asked == common_keys()[:1]
 
 

@@ -98,7 +98,7 @@ class Looping:
         self.renderer, self.compiler = renderer, Compiler()
         self._end, its = channel.pair()
         memory = heartbeat.memory()
-        self._loop = Loop(its, renderer, heartbeat.Heartbeat(memory), 1 << 30, None, 1.0, foresees=False)
+        self._loop = Loop(its, renderer, heartbeat.Heartbeat(memory), 1 << 30, None, 1.0, ahead="off")
         os.close(memory)
         self._loop._compiler._lanes["now"].helper = self.compiler  # type: ignore[assignment]
         self._heard: list[Any] = []
