@@ -8,6 +8,7 @@
 # With Ray, for the nodes of a cluster (docs/scaling.md):
 #   docker build --build-arg LOCK=ray -t sunbox-ray .
 # With USD files: docker build --build-arg LOCK=usd -t sunbox-usd .
+# With the kernels of the processor that builds it, which take 2 min: docker build --build-arg WARM=1 -t sunbox .
 # Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22. By digest,
 # as a tag may become another image; Dependabot proposes the next one.
 
@@ -57,6 +58,9 @@ ENV PATH=/opt/sunbox/bin:$PATH \
     SUNBOX_HOST=0.0.0.0 \
     SUNBOX_PORT=8000
 USER 10001
+# Of use where the same kind of processor renders, and in a volume that is new; other machines compile their own.
+ARG WARM=
+RUN if [ -n "$WARM" ]; then sunbox warm; fi
 VOLUME /data
 EXPOSE 8000
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-m", "service.commands.health"]

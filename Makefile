@@ -1,4 +1,5 @@
 # make run [PORT=8000]   set everything up and serve the editor
+# make warm              set everything up and compile the kernels of the built-in scenes and of the library: 2 min, once
 # make test              set everything up and pass the tests
 # make long-test         pass the tests that `make test` leaves out: those that take longest, and those of the benchmarks;
 #                        and the tests of pictures once more, by each scene's own kernels
@@ -17,10 +18,13 @@ export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test long-test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
+.PHONY: run warm test long-test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
+
+warm: setup
+	@.venv/bin/sunbox warm
 
 test:
 	@.ci/setup test

@@ -15,6 +15,7 @@ from importlib import import_module, metadata
 from service.commands import CommandError
 from service.views import AOVS, BSDF_KINDS, COLOR_SPACES, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, MAPS, TONE_MAPS
 
+MOST_JOBS = 256  # of `warm`
 BENCHES = ("speed", "gpu", "tradeoff", "seeds", "scale")
 
 
@@ -60,6 +61,7 @@ def parser() -> argparse.ArgumentParser:
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
     _export(commands.add_parser("export", help="turn a scene into a file for another program"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains and needs"))
+    _warm(commands.add_parser("warm", help="compile kernels before a server needs them"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
     _mcp(commands.add_parser("mcp", help="serve tools for agents on stdin and stdout, by the Model Context Protocol"))
     commands.add_parser("callback-secret", help="print the secrets that sign callbacks, one a line")
@@ -221,6 +223,14 @@ def _mcp(command: argparse.ArgumentParser) -> None:
     command.add_argument("--url", metavar="URL", help=text)
 
 
+def _warm(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    text = "a scene that will be edited, besides the built-in ones: JSON, or a glTF, OBJ, PLY or STL model"
+    add("scenes", nargs="*", metavar="SCENE", help=text)
+    add("--jobs", type=_jobs, metavar="N", help="processes that compile (default: one for each processor)")
+    _asset_root(command)
+
+
 def _check_data(command: argparse.ArgumentParser) -> None:
     text = "the folder, which a server may be using (default: SUNBOX_DATA_DIR)"
     command.add_argument("folder", nargs="?", metavar="FOLDER", help=text)
@@ -284,6 +294,12 @@ def _bench(command: argparse.ArgumentParser) -> None:
 
 def _setting(name: str) -> Callable[[str], str]:
     return lambda value: f"{name}={value}"
+
+
+def _jobs(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= MOST_JOBS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes: a whole number from 1 to {MOST_JOBS}")
+    return int(text)
 
 
 def _port(text: str) -> int:

@@ -189,10 +189,10 @@ class Config(BaseSettings):
     )
     ahead: Ahead = Field(
         "some",
-        description="Which kernels are compiled before anybody waits for them: `off`, none; `some`, those that the "
-        "next edit of a stream may need, and for nobody in particular at most 60 s of a processor after a start, none "
-        "on battery or with less than one processor; `all`, without these bounds. With `off` there are no first looks "
-        "while a kernel is compiled, either.",
+        description="Which kernels are compiled before anybody waits for them: `off`, none; `some`, those that "
+        "the next edit of a stream may need, and for nobody in particular at most 60 s of a processor after a start, "
+        "none on battery or with less than one processor; `all`, without these bounds. With `off` there are no first "
+        "looks while a kernel is compiled, either.",
     )
     nice: int = Field(
         default_factory=lambda: 0 if in_container() else NICENESS,

@@ -17,6 +17,7 @@ import         a model as a document with files beside it
 export         a scene as a file for another program
 info           what a scene contains, and what would render it here
 callback_secret  the secrets that sign callbacks
+warm           kernels, compiled before a server needs them
 mcp            tools for agents
 check_data     whether the data folder is sound
 bench          the benchmarks

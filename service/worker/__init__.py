@@ -8,6 +8,7 @@ loop          takes the newest messages, chooses whose turn it is, traces a slic
 scheduler     whose turn it is
 task          one client's task: whether it wants a turn
 task_picture  its picture, from the first update to the end
+warming       kernels that are compiled before any renderer is there
 foreseen      kernels that are compiled before anything needs them
 bsdf_task     one question about the BSDF of a material, in its turns
 updates       the update that waits to be applied, perhaps for its kernel

@@ -81,13 +81,12 @@ class Loop:
         self._compiler = CompileClient(renderer.info, device, lifeline, foresees)
         # A GPU's driver has no such choice.
         looks = foresees and renderer.info["software"] and self._compiler.able
-        self._first_looks = FirstLookClient(device, compiler_memory(renderer.info)) if looks else None
         self._context = WorkerContext(
             renderer,
             self._send,
             self._denoiser,
             self._compiler,
-            self._first_looks,
+            FirstLookClient(device, compiler_memory(renderer.info)) if looks else None,
             self._memory,
             self._forget,
             checkpoint_s,
@@ -113,8 +112,8 @@ class Loop:
             self._take(message)
         self._denoiser.hear()
         self._compiler.hear()
-        if self._first_looks is not None:
-            self._first_looks.hear()
+        if self._context.first_looks is not None:
+            self._context.first_looks.hear()
         chosen = self._scheduler.choose(self._everyone)
         if chosen is not None:
             began = time.monotonic()
@@ -137,7 +136,7 @@ class Loop:
         """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
         if wait:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
-            ends += [] if self._first_looks is None else self._first_looks.ends
+            ends += [] if self._context.first_looks is None else self._context.first_looks.ends
             waits = [self._compiler.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
             waits += [task.left_s for task in self._tasks.values()]

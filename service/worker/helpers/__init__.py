@@ -7,7 +7,6 @@ kernel_wait     one kernel that a task waits for
 used_kernels    the kernels that pictures were made with on this machine
 compile_main    compiles kernels: `python -m service.worker.helpers.compile_main`
 first_look_client  asks for first looks at scenes whose kernels are being compiled
-first_look_main  shows them, by kernels that LLVM does not optimise
 denoise_client  asks for pictures to be denoised
 denoise_main    denoises pictures: `python -m service.worker.helpers.denoise_main`
 """

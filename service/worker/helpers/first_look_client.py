@@ -61,7 +61,7 @@ class FirstLookClient:
         """`memory`: bytes that the process may take beside its context."""
         words = [word for word in (os.environ.get("GALLIVM_PERF", ""), UNOPTIMISED) if word]
         given = ["--memory", str(memory), *([] if device is None else ["--device", str(device)])]
-        module = "service.worker.helpers.first_look_main"
+        module = "service.worker.view.first_look_main"
         self._helper = HelperProcess(module, *given, environment={"GALLIVM_PERF": ",".join(words)})
         self._told: dict[int, tuple[int, Told]] = {}  # by task: the generation that it waits for, and whom to tell
         self._failures = 0

@@ -1,4 +1,4 @@
-"""Shows first looks: `GALLIVM_PERF=nopt python -m service.worker.helpers.first_look_main DESCRIPTOR --parent PID`.
+"""Shows first looks: `GALLIVM_PERF=nopt python -m service.worker.view.first_look_main DESCRIPTOR --parent PID`.
 
 A renderer of its own, by kernels that LLVM does not optimise. The pictures are for the eye alone: what is kept is
 traced by the kernels of the other renderer, from the first sample.
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m service.worker.helpers.first_look_main")
+    parser = argparse.ArgumentParser(prog="python -m service.worker.view.first_look_main")
     parser.add_argument("descriptor", type=int)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--memory", type=int, required=True, help="bytes that it may take beside its context")
