@@ -10,8 +10,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
+    BaseModel,
     BeforeValidator,
     ByteSize,
+    ConfigDict,
     Field,
     TypeAdapter,
     ValidationError,
@@ -19,7 +21,6 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from service.callback_hosts import checked_hosts, checked_secrets
 from service.containers import in_container
@@ -39,7 +40,7 @@ ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
 
 NICENESS = 5  # steps, where the machine may be somebody's desktop: a quarter of a processor beside a busy program
 Ahead = Literal["off", "some", "all"]  # kernels that are compiled before anybody waits for them
-Words = Annotated[list[str], NoDecode]
+PREFIX = "SUNBOX_"  # how the names of all variables begin, in capitals or not
 # Fields whose variables are lists, separated by commas.
 WORDS = (
     "allowed_hosts", "allowed_origins", "api_key", "callback_hosts", "callback_secret", "devices", "trusted_proxies",
@@ -56,8 +57,7 @@ def _size(value: Any) -> Any:
         raise ValueError(f"{value!r} is no size; write bytes, or a number with a unit, as 512 MiB or 10 GB") from None
 
 
-_SIZE = TypeAdapter(ByteSize)
-Bytes = Annotated[int, BeforeValidator(_size)]
+_SIZE, Bytes = TypeAdapter(ByteSize), Annotated[int, BeforeValidator(_size)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -71,40 +71,40 @@ def _default_data_dir() -> Path:
     return (Path(cache) if os.path.isabs(cache) else Path.home() / ".cache") / "sunbox"
 
 
-class Config(BaseSettings):
-    """Each field is read from SUNBOX_ and its name in capitals; the descriptions are the table of
+class Config(BaseModel):
+    """Each field that is not given is read from SUNBOX_ and its name in capitals; the descriptions are the table of
     docs/operation.md."""
 
-    model_config = SettingsConfigDict(env_prefix="SUNBOX_", frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="ignore", validate_default=True)
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    api_key: Words = Field(
+    api_key: list[str] = Field(
         default_factory=list,
         repr=False,
         description="Keys, separated by commas, one of which `/v1/*` then asks for; renders and saved "
         "documents belong to their key.",
     )
-    allowed_hosts: Words = Field(
+    allowed_hosts: list[str] = Field(
         default_factory=list,
         description="Names besides 127.0.0.1 and localhost, separated by commas, by which this server may be reached "
         "(default: none on a loopback address, any on another).",
     )
-    allowed_origins: Words = Field(
+    allowed_origins: list[str] = Field(
         default_factory=list, description="Origins besides the server's own that may call, separated by commas."
     )
-    trusted_proxies: Words = Field(
+    trusted_proxies: list[str] = Field(
         default_factory=list,
         description="Addresses and networks of proxies, separated by commas, whose `X-Forwarded-For` says who calls; "
         "without it that header changes nothing.",
     )
-    callback_hosts: Annotated[list[str], NoDecode, AfterValidator(checked_hosts)] = Field(
+    callback_hosts: Annotated[list[str], AfterValidator(checked_hosts)] = Field(
         default_factory=list,
         description="Hosts to which [callbacks](#callbacks) may be sent, separated by commas (`hooks.example.org`, "
         "`hooks.example.org:8443`, `http://10.0.0.5:8080`), and networks that are not public in which their "
         "addresses may lie (`10.0.0.0/8`); without it callbacks are refused.",
     )
-    callback_secret: Annotated[list[str], NoDecode, AfterValidator(checked_secrets)] = Field(
+    callback_secret: Annotated[list[str], AfterValidator(checked_secrets)] = Field(
         default_factory=list,
         repr=False,
         description="Secrets that sign callbacks, separated by commas: `whsec_` and 24 to 64 bytes in base64 "
@@ -122,7 +122,7 @@ class Config(BaseSettings):
     )
     data_files: int = Field(1_000_000, ge=1, description="Most files that they take, two for an asset.")
     device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
-    devices: Words = Field(
+    devices: list[str] = Field(
         default_factory=list,
         description="Renderers, a process each: numbers of EGL devices, separated by commas, or `llvmpipe:N` for N "
         "that divide the processor's cores (default: one, on `SUNBOX_DEVICE`).",
@@ -279,11 +279,13 @@ class Config(BaseSettings):
     @model_validator(mode="before")
     @classmethod
     def _given(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """Leave out variables that are set to nothing, as `SUNBOX_DEVICE: ${SUNBOX_DEVICE:-}` in a compose file does.
+        """Add the variables of the environment, and leave out those that are set to nothing, as
+        `SUNBOX_DEVICE: ${SUNBOX_DEVICE:-}` in a compose file does.
 
         Not the keys: a secret that is empty by mistake would open the service to everybody.
         """
-        return {name: value for name, value in values.items() if value != "" or name == "api_key"}
+        given = (_variables() | values).items()
+        return {name: value for name, value in given if value != "" or name == "api_key"}
 
     @field_validator(*WORDS, mode="before")
     @classmethod
@@ -373,19 +375,25 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def _variables() -> dict[str, str]:
+    """What the environment sets, by the names of fields: as pydantic-settings has it, which takes 60 ms to load."""
+    given = {name.upper(): value for name, value in os.environ.items()}
+    return {name.removeprefix(PREFIX).lower(): given[name] for name in given if name.startswith(PREFIX)}
+
+
 def load_config(**given: Any) -> Config:
     """`given` (where not None) over the environment. Raises ConfigError naming each bad variable."""
     try:
         return Config(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        lines = [f"SUNBOX_{str(e['loc'][0]).upper()}: {_said(e['msg'])}" for e in error.errors()]
+        lines = [f"{PREFIX}{str(e['loc'][0]).upper()}: {_said(e['msg'])}" for e in error.errors()]
         raise ConfigError("; ".join(lines)) from None
 
 
 def unknown_variables() -> list[str]:
     """SUNBOX_* in the environment that are no settings: they may be misspelt ones, and the key may be among those."""
-    known = {f"SUNBOX_{name.upper()}" for name in Config.model_fields}
-    return sorted(name for name in os.environ if name.upper().startswith("SUNBOX_") and name.upper() not in known)
+    known = {f"{PREFIX}{name.upper()}" for name in Config.model_fields}
+    return sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
 
 
 def _said(message: str) -> str:

@@ -26,7 +26,7 @@ SOURCES = sorted((*MODULES, *CLIENT, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROO
 MOST_LINES = 400
 MOST_METHODS, MOST_ATTRIBUTES = 30, 18  # of a class, its bases included
 # Classes whose fields are a format, a document or a row, and not state that methods share.
-DATA = {"BaseModel", "BaseSettings", "Model", "Record", "IntEnum", "Enum", "Protocol"}
+DATA = {"BaseModel", "Model", "Record", "IntEnum", "Enum", "Protocol"}
 # Classes that are larger, each with the reason why it is one all the same.
 LARGE_CLASSES = {
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
@@ -110,7 +110,7 @@ SHARED_BY_PROCESSES = (
     "service.ipc", "service.system", "service.logs", "service.quality", "service.views", "service.displays"
 )  # fmt: skip
 ERRORS = ("gpu.errors", "service.problems")
-WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
+WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic"}
 
 # The rooms of the editor, from the bottom to the top; "" is web/ itself.
 WEB_ROOMS = "lib; server; document lobe; forms picture; panels renders; compare widget"
