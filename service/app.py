@@ -64,6 +64,7 @@ from service.storage.database import DamagedFile
 from service.storage.stores import storage
 from service.system.background import report_callbacks, reported
 from service.system.confined import hide
+from service.system.garbage import loaded
 from service.system.memory import MemoryBudget
 from service.system.priority import set_steps
 from service.system.shared_memory import return_freed
@@ -181,6 +182,7 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     state.storage.prepare()
     state.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
     server = _Server(server_settings(app, config, most), state)
+    loaded()
     server.run([listener])
     return 1 if server.refused else 0
 

@@ -68,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
     given = read_settings(arguments.set or [], config)
+    from service.system.garbage import loaded
     from service.system.shared_memory import reuse_freed  # here, as it loads numpy
 
     reuse_freed()
@@ -96,6 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
             with interrupt.watch(), InProcessRenderer(config.device) as renderer:
                 tracing = Tracing(renderer, packed, resolve(chosen))
                 setup_s = time.perf_counter() - began
+                loaded()
                 tracing.run(interrupt)
                 files.write(output.path, _encode(tracing, output, document, names, lut))
                 tracing.close()

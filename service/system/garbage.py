@@ -16,6 +16,17 @@ _pauses = 0  # under way, in any thread
 _was_enabled = False
 
 
+def loaded() -> None:
+    """Begin to collect where a program began without the collector: it has loaded what it works with.
+
+    Those objects stay to the end, and are taken out of the collector's sight: each collection of all objects would go
+    through them. Nothing happens where the collector works already.
+    """
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
+
+
 @contextmanager
 def collector_paused() -> Iterator[None]:
     """Pause the collector while the context lasts; several threads may do so at once."""
