@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes.util
+import contextlib
+import ctypes
 import logging
 import threading
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,7 @@ _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render driv
 
 def devices() -> list[egl.Device]:
     """EGL's devices; their numbers are their places in the list. Raises ContextError without libEGL."""
-    found = ctypes.util.find_library("EGL")
+    found = egl_library()
     if found is None:
         raise ContextError(f"libEGL is not installed: on Debian `apt-get install {PACKAGES}`")
     try:
@@ -50,7 +52,7 @@ def create(device: int | None = None) -> Any:
     import moderngl
 
     opengl = opengl_library()
-    for name, library in (("libEGL", ctypes.util.find_library("EGL")), ("libOpenGL", opengl)):
+    for name, library in (("libEGL", egl_library()), ("libOpenGL", opengl)):
         if library is None:
             raise ContextError(f"{name} is not installed: on Debian `apt-get install {PACKAGES}`")
     options: dict[str, Any] = {"backend": "egl", "libgl": opengl}
@@ -79,7 +81,7 @@ def _resettable(device: int) -> Any:
     import moderngl
 
     try:
-        library = egl.functions(ctypes.util.find_library("EGL") or "")
+        library = egl.functions(egl_library() or "")
         backend = egl.EglContext(library, ctypes.CDLL(opengl_library()), device, REQUIRED)
     except (egl.EglError, AttributeError, OSError) as error:
         log.info("a reset of the device will not be noticed", {"error": error})
@@ -207,6 +209,24 @@ def _memory(context: Any) -> int | None:
     return kibibytes.value * 1024 if kibibytes.value > 0 else None
 
 
+def egl_library() -> str | None:
+    """The name of EGL's library; None where it is not installed."""
+    return _first_library("libEGL.so.1")
+
+
 def opengl_library() -> str | None:
     """The name of the library with OpenGL's functions; the first of these comes without X11's libraries."""
-    return ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")
+    return _first_library("libOpenGL.so.0", "libGL.so.1")
+
+
+@cache
+def _first_library(*names: str) -> str | None:
+    """The first of these libraries that can be loaded, under the name by which programs are linked to it.
+
+    ctypes.util.find_library starts a process for each question, which takes 5 ms.
+    """
+    for name in names:
+        with contextlib.suppress(OSError):
+            ctypes.CDLL(name)
+            return name
+    return None

@@ -6,11 +6,12 @@ With GL_AMD_pinned_memory a million triangles are in memory once: the driver mak
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 from functools import cache
 from typing import Any
 
 import numpy as np
+
+from gpu.context import opengl_library
 
 LEAST = 1 << 18  # bytes; smaller arrays are copied
 _TARGET, _STATIC_DRAW = 0x9160, 0x88E4  # EXTERNAL_VIRTUAL_MEMORY_BUFFER_AMD
@@ -61,4 +62,4 @@ def pin(context: Any, array: np.ndarray) -> Pinned | None:
 
 @cache
 def _functions() -> Any:
-    return ctypes.CDLL(ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL"))
+    return ctypes.CDLL(opengl_library())
