@@ -99,7 +99,7 @@ class Prober:
         for slot, buffer in made.items():
             buffer.bind_to_storage_buffer(int(slot))
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
-        table[:, 0] = filters.inverse(filter_name, features.FILTER_TABLE_SIZE)
+        table[:, :2] = filters.table(filter_name, features.FILTER_TABLE_SIZE)
         blocks = [self.context.buffer(table.tobytes())]
         frame = np.zeros((), layout.Uniforms.dtype) if frame is None else frame
         blocks.append(self.context.buffer(frame.tobytes()))

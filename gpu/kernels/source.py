@@ -64,6 +64,9 @@ class _Assembly:
         out = [f"#line 1 {number}"]
         depth = 0
         for at, line in enumerate(_read(name, self._folders).splitlines(), 1):
+            if "#" not in line:
+                out.append(line.split("//")[0])  # llvmpipe reads a kernel in 6 % less time without comments
+                continue
             include, condition = _INCLUDE.match(line), _CONDITION.match(line)
             if condition:
                 for word in _WORD.findall(condition.group(1).split("//")[0]):
@@ -72,7 +75,7 @@ class _Assembly:
             elif line.lstrip().startswith("#endif"):
                 depth -= 1
             if include is None:
-                out.append(line.split("//")[0])  # llvmpipe reads a kernel in 6 % less time without comments
+                out.append(line.split("//")[0])
             elif depth:
                 raise CompileError(f"{name}:{at}: an include inside #if may be the one that is skipped")
             elif include.group(1) not in self._files:

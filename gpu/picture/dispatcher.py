@@ -37,8 +37,7 @@ class Dispatcher:
         """Set the settings of the dispatches that follow."""
         self.settings = settings
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
-        table[:, 0] = filters.inverse(settings.filter, features.FILTER_TABLE_SIZE)
-        table[:, 1] = filters.density(settings.filter, features.FILTER_TABLE_SIZE)
+        table[:, :2] = filters.table(settings.filter, features.FILTER_TABLE_SIZE)
         self._filter.write(table)
 
     def bind(self) -> None:

@@ -28,20 +28,16 @@ def profile(name: str, x: np.ndarray) -> np.ndarray:
 
 
 @cache
-def density(name: str, size: int) -> np.ndarray:
-    """The density along one axis, 1/pixel, at k / size of the radius, for k = 0 .. size: float32."""
-    x = np.linspace(0, RADIUS[name], 1 << 17)
-    w = profile(name, x)
-    total = 2 * np.sum(0.5 * (w[1:] + w[:-1])) * (x[1] - x[0])
-    out: np.ndarray = profile(name, np.linspace(0, RADIUS[name], size + 1)) / total
-    return out.astype(np.float32)
+def table(name: str, size: int) -> np.ndarray:
+    """The filter along one axis, (size + 1, 2) float32, for k = 0 .. size.
 
-
-@cache
-def inverse(name: str, size: int) -> np.ndarray:
-    """The distances (pixels, float32) within which the half profile has 1 - (1 - k / size)^4 of its weight, for
-    k = 0 .. size."""
-    x = np.linspace(0, RADIUS[name], 1 << 17)
+    First the distances (pixels) within which the half profile has 1 - (1 - k / size)^4 of its weight, then the
+    density at k / size of the radius, 1/pixel.
+    """
+    x = np.linspace(0, RADIUS[name], 1 << 17)  # so finely that sums are integrals
     w = profile(name, x)
-    cdf = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))])
-    return np.interp(1 - (1 - np.linspace(0, 1, size + 1)) ** 4, cdf / cdf[-1], x).astype(np.float32)
+    areas = 0.5 * (w[1:] + w[:-1])
+    cdf = np.concatenate([[0.0], np.cumsum(areas)])
+    inverse = np.interp(1 - (1 - np.linspace(0, 1, size + 1)) ** 4, cdf / cdf[-1], x)
+    density = profile(name, np.linspace(0, RADIUS[name], size + 1)) / (2 * np.sum(areas) * (x[1] - x[0]))
+    return np.stack([inverse, density], axis=1).astype(np.float32)
