@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from service.ipc.messages import TRUSTED_SAMPLES
 from service.scene.settings import BALANCED, Settings
 
 # What each preset puts in the place of what is not given. Samples go up by four, which halves the noise; bounces end
@@ -22,7 +23,6 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 PRICES_FILE = Path(__file__).with_name("prices.json")  # written by `sunbox bench tradeoff --publish`
-TRUSTED_SAMPLES = 16  # from which on the noise meter tells the truth
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
 LARGE = 4 << 20  # bytes, which are copied in about a millisecond
+TRUSTED_SAMPLES = 16  # from which on the noise meter tells the truth
 
 
 class SceneData(Protocol):

@@ -18,6 +18,7 @@ from typing import Any, Literal, Protocol
 
 from service.config import Ahead
 from service.ipc import channel, heartbeat
+from service.ipc.server_end import Channel
 from service.logs import setup
 from service.system.child_processes import inherited_environment
 from service.system.cpu_time import RunnableTime
@@ -120,7 +121,7 @@ class Process:
             theirs.close()
             os.close(self.heartbeat.descriptor)
         self.heartbeat.begin(self._process.pid)
-        self.link = channel.Channel(ours, received, lost)
+        self.link = Channel(ours, received, lost)
 
     @property
     def lived_s(self) -> float:

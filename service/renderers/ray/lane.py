@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 from service.ipc import channel
 from service.ipc.messages import Failed, FromRenderer, ToRenderer, Unable, Update
+from service.ipc.server_end import Channel
 from service.ipc.task_control import Drop, TakeCheckpoint
 from service.problems import MISTAKE
 from service.renderers.local.process import Waiting
@@ -67,7 +68,7 @@ class Lane:
         self._loss = "node lost"  # why, when the actor is lost
         self._over = asyncio.Event()  # the supervisor has closed its end
         self._carrying = Background()
-        self._link = channel.Channel(end, self._received, self._over.set)
+        self._link = Channel(end, self._received, self._over.set)
 
     async def run(self) -> None:
         work = asyncio.ensure_future(self._work())

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from service.ipc import channel
+from service.ipc.server_end import Channel
 from service.renderers.local.process import Cause
 from service.renderers.ray.control import Ended
 
@@ -38,7 +39,7 @@ class ClusterProcess:
             self.id = carry(theirs)
         finally:
             theirs.close()
-        self.link = channel.Channel(ours, self._heard, lost)
+        self.link = Channel(ours, self._heard, lost)
 
     @property
     def lived_s(self) -> float:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from service.ipc.messages import StopRule
-from service.quality import TRUSTED_SAMPLES
+from service.ipc.messages import TRUSTED_SAMPLES, StopRule
 from service.worker.progress.stop_rules import judged_from
 
 GROWTH = 1.05  # of samples from one mark to the next: some hundred marks to a million

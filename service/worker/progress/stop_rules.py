@@ -6,8 +6,7 @@ import math
 import time
 
 from gpu import stop_after
-from service.ipc.messages import Reason, StopRule
-from service.quality import TRUSTED_SAMPLES
+from service.ipc.messages import TRUSTED_SAMPLES, Reason, StopRule
 
 MAX_SAMPLES = 1 << 24  # of the contract: where float32 sums stop counting
 # Numbers of samples in an octave at which `target_noise` is judged, at most, as reading the noise takes time. From

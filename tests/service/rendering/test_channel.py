@@ -14,6 +14,7 @@ import pytest
 from gpu import SceneEdit
 from service.ipc import channel
 from service.ipc.messages import Frame, Progress, StopRule, Update, View, Want
+from service.ipc.server_end import Channel
 
 
 @pytest.fixture
@@ -97,7 +98,7 @@ def test_the_event_loop_sends_more_than_the_socket_holds() -> None:
 
     async def exchange() -> list[int]:
         ours, theirs = channel.pair()
-        sender = channel.Channel(ours, lambda message: None, lambda: None)
+        sender = Channel(ours, lambda message: None, lambda: None)
         for number in range(2000):
             sender.send((number, b"." * 1000))
         got: list[int] = []
@@ -108,7 +109,7 @@ def test_the_event_loop_sends_more_than_the_socket_holds() -> None:
             if len(got) == 2000:
                 done.set()
 
-        receiver = channel.Channel(theirs, take, lambda: None)
+        receiver = Channel(theirs, take, lambda: None)
         await asyncio.wait_for(done.wait(), 10)
         sender.close()
         receiver.close()
@@ -121,7 +122,7 @@ def test_the_event_loop_hears_of_the_other_end_once() -> None:
     async def exchange() -> int:
         ours, theirs = channel.pair()
         lost = []
-        alone = channel.Channel(ours, lambda message: None, lambda: lost.append(True))
+        alone = Channel(ours, lambda message: None, lambda: lost.append(True))
         theirs.close()
         alone.send("nobody hears this")
         await asyncio.sleep(0.05)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import os
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -362,3 +364,11 @@ def test_its_end_is_told_to_all_who_have_work_there() -> None:
 
     with_fake_processes(test, FakeProcesses())
     assert ears.messages.get_nowait() == CLOSING
+
+
+@pytest.mark.parametrize("module", ["service.worker.loop", "service.worker.helpers.compile_main"])
+def test_what_renders_loads_no_model_of_a_document(module: str) -> None:
+    """pydantic and the models take as long to load as all else that these processes need."""
+    program = f"import sys, {module}; print({{'pydantic', 'service.scene', 'asyncio'}} & set(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (answer.returncode, answer.stdout) == (0, "set()\n"), answer.stderr

@@ -18,6 +18,7 @@ import pytest
 from service.config import ConfigError, load_config
 from service.ipc import channel
 from service.ipc.messages import Unable, Update
+from service.ipc.server_end import Channel
 from service.renderers.local.process import Waiting
 from service.renderers.ray import carriage, code, lane
 from service.renderers.ray.carriage import Scenes, digest
@@ -165,7 +166,7 @@ class Actors:
 async def told(actors: Actors, count: int) -> list[Any]:
     ours, theirs = channel.pair()
     heard = list[Any]()
-    link = channel.Channel(ours, heard.append, lambda: None)
+    link = Channel(ours, heard.append, lambda: None)
     running = asyncio.ensure_future(Lane(0, theirs, actors).run())
     await until(lambda: len(heard) >= count)
     link.close()
