@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import logging
 import os
 import signal
@@ -15,6 +16,7 @@ from service.ipc.heartbeat import Heartbeat
 from service.ipc.messages import Ready, Unable
 from service.logs import setup
 from service.system.confined import hide
+from service.system.garbage import loaded
 from service.system.lifeline import end_with
 from service.system.priority import raise_process_niceness
 from service.system.shared_memory import return_freed
@@ -27,6 +29,7 @@ log = logging.getLogger("service.worker")  # __name__ is __main__ here
 
 
 def main() -> int:
+    gc.disable()  # until all that this process works with is loaded
     parser = argparse.ArgumentParser(prog="python -m service.worker")
     parser.add_argument("descriptor", type=int)
     parser.add_argument("heartbeat", type=int)
@@ -90,6 +93,7 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
             "the processor renders, as this user may not use the GPU",
             {"device": closed[0], "group": closed[0].group()},
         )
+    loaded()
     heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
     Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline, arguments.ahead).run()
     return 0

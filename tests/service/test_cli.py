@@ -127,6 +127,24 @@ def test_mistakes_are_found_before_opengl_is_loaded(scene: Path, tmp_path: Path)
     assert answer.returncode == 2, answer.stderr
 
 
+def test_the_process_ends_with_its_command_s_code_after_all_that_was_registered(tmp_path: Path) -> None:
+    program = (
+        "import atexit, sys, threading, time\n"
+        "from service import cli\n"
+        "def work():\n"
+        "    time.sleep(0.2)\n"
+        "    print('worked', end=' ')\n"
+        "def command():\n"
+        "    atexit.register(print, 'ended', end='')\n"
+        "    threading.Thread(target=work).start()\n"
+        "    return 3\n"
+        "cli.main = command\n"
+        "sys.exit(cli.program())"
+    )
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (answer.returncode, answer.stdout, answer.stderr) == (3, "worked ended", "")
+
+
 @pytest.mark.parametrize(("aov", "channels"), [("color", 4), ("albedo", 3), ("normal", 3), ("depth", 1)])
 def test_npy_holds_linear_floats(aov: str, channels: int, gpu: Any, scene: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.npy"
