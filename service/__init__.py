@@ -1,6 +1,7 @@
 """What a scene means: documents, assets, jobs, routes and the command line. No GL call is made outside of `worker`.
 
 app        what is served: the routes and the editor's files
+launch     how a server starts
 cli        the command line; `commands` has a module for each command
 config     every limit, and the SUNBOX_* variables that set it
 callback_hosts  where callbacks may be sent

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import logging
 import os
-import resource
 import signal
 import socket
 import sys
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from importlib import metadata
@@ -25,17 +23,17 @@ from starlette.requests import HTTPConnection
 from starlette.responses import FileResponse, Response
 
 from service import presets
-from service.config import Config, cores, unknown_variables
+from service.config import Config
 from service.http.compression import Compressed
 from service.http.connection_limits import Watch
-from service.http.connections import connection_class, listen
+from service.http.connections import connection_class
 from service.http.downloads import Pieces
 from service.http.guard import Guard, open_for_health, turning_away
 from service.http.request_log import Requests
 from service.problems import Unavailable
 from service.renderers.first_frame import foresee, warm_up
-from service.renderers.pool.devices import missing_device, seats
-from service.renderers.pool.pool import Pool
+from service.renderers.pool.devices import seats
+from service.renderers.pool.pool import Pool, Seat
 from service.renderers.ray.joining import CannotJoin
 from service.renderers.ray.pool import cluster_pool
 from service.renders.queue import RenderQueue
@@ -59,15 +57,11 @@ from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import Files, respond, tell_errors
 from service.state import MESSAGE_BYTES, STARTING_S, AppState, app_state
-from service.storage.data_lock import FolderInUse, locked
 from service.storage.database import DamagedFile
 from service.storage.stores import storage
 from service.system.background import report_callbacks, reported
-from service.system.confined import hide
 from service.system.garbage import loaded
 from service.system.memory import MemoryBudget
-from service.system.priority import set_steps
-from service.system.shared_memory import return_freed
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # seconds between pings: proxies cut connections that are idle for a minute
@@ -76,26 +70,14 @@ TICKS = 10  # of uvicorn, which ticks ten times a second, between two checks of 
 GRACE_S = 10  # for answers under way when the server ends
 AGAIN_S = 1.0  # before it a second signal is ignored, as `timeout` sends two in a row; after it one ends at once
 LAST_RESORT_S = 14.0  # from the signal to a forced end; operators count on 15
-DESCRIPTORS = 65_536
-# Python's switch interval: how long a computing thread may delay the event loop after each of its system calls. With
-# the default, 5 ms, an answer of ten calls takes 50 ms while a scene is being validated.
-SWITCH_S = 0.001
-OPEN_TO_ALL = (
-    "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
-    "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1)"
-)
-CROWDED = (
-    "SUNBOX_DEVICES asks for more renderers on the processor than it has cores: together they are slower than one "
-    "for each core"
-)
-
 FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX_CONNECTIONS).", 5)
 
 log = logging.getLogger(__name__)
 
 
-def create_app(config: Config) -> FastAPI:
-    """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
+def create_app(config: Config, places: Sequence[Seat] = ()) -> FastAPI:
+    """The service as an ASGI application. The renderers' processes start with its lifespan, if they were not started
+    before on these `places`, and end with it."""
     stored = storage(config, lambda: store.pictures)
     store = RenderStore(config.data_dir, stored.quota.room, partial(stored.quota.room, reserved=True))
     memory = MemoryBudget(config.memory)
@@ -103,7 +85,7 @@ def create_app(config: Config) -> FastAPI:
         config,
         stored,
         RequestReader(config, stored.assets, memory, stored.access),
-        Pool(seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
+        Pool(places or seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(
@@ -144,42 +126,17 @@ def create_app(config: Config) -> FastAPI:
     return app
 
 
-def run(config: Config) -> int:
-    """Print the address and serve until SIGINT or SIGTERM. Returns the exit code: 1 where it could not start."""
-    return_freed()
-    hide()
-    sys.setswitchinterval(SWITCH_S)
-    set_steps(config.nice)
-    if unknown := unknown_variables():
-        log.warning("these variables are no settings and change nothing", {"names": ",".join(unknown)})
-    if (reason := missing_device(config)) is not None:
-        log.error("did not start", {"reason": reason})
-        return 1
-    if config.software_renderers > cores():
-        log.warning(CROWDED, {"renderers": config.software_renderers, "cores": cores()})
-    most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
+def serve(config: Config, listener: socket.socket, most: int, places: Sequence[Seat] = ()) -> int:
+    """Print the address and serve until SIGINT or SIGTERM, with at most `most` connections; `places` as for
+    `create_app`. Returns the exit code: 1 where it could not start."""
+    host, port = listener.getsockname()[:2]
     try:
-        listener = listen(config.host, config.port)
-    except OSError as error:
-        log.error("could not listen", {"host": config.host, "port": config.port, "error": error.strerror or error})
-        return 1
-    host = listener.getsockname()[0]
-    if not config.api_key and not ipaddress.ip_address(host).is_loopback:
-        log.warning(OPEN_TO_ALL, {"host": host})
-    try:
-        with listener, locked(config.data_dir):
-            return _serve(config, listener, most)
-    except (DamagedFile, FolderInUse, CannotJoin) as error:
+        app = create_app(config, places)
+        state: AppState = app.state.sunbox
+        state.storage.prepare()
+    except (DamagedFile, CannotJoin) as error:
         log.error("did not start", {"reason": error})
         return 1
-
-
-def _serve(config: Config, listener: socket.socket, most: int) -> int:
-    """Serve with at most `most` connections; the exit code. Raises DamagedFile, CannotJoin."""
-    host, port = listener.getsockname()[:2]
-    app = create_app(config)
-    state: AppState = app.state.sunbox
-    state.storage.prepare()
     state.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
     server = _Server(server_settings(app, config, most), state)
     loaded()
@@ -206,18 +163,6 @@ def server_settings(app: FastAPI, config: Config, most: int) -> uvicorn.Config:
         timeout_keep_alive=KEEP_ALIVE_S,
         timeout_graceful_shutdown=GRACE_S,
     )
-
-
-def _take_descriptors() -> int:
-    """Raise the limit of descriptors as far as the system allows, and return it. Each client, scene and asset takes
-    some; a shell's default, 1 024, is made for programs that wait with select().
-    """
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
-    if soft != resource.RLIM_INFINITY and soft < most:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
-        return most
-    return DESCRIPTORS if soft == resource.RLIM_INFINITY else soft
 
 
 class _Server(uvicorn.Server):

@@ -59,6 +59,7 @@ LAYERS = [
     {"service.state"},
     {"service.routes"},
     {"service.app"},
+    {"service.launch"},
     {"service.bench"},
     {"service.commands"},
     {"service.cli"},
@@ -83,15 +84,8 @@ LOOKS_INTO_GPU = {
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
 WITHOUT_GL = (
-    "gpu.layout",
-    "gpu.accel",
-    "gpu.tables",
-    "gpu.errors",
-    "gpu.settings",
-    "gpu.steps",
-    "gpu.jit",
-    "gpu.denoise",
-)
+    "gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"
+)  # fmt: skip
 GL_SIDE = (
     "gpu.context",
     "gpu.kernels",
@@ -255,11 +249,12 @@ def test_only_the_renderers_process_and_the_benchmarks_touch_gl() -> None:
 
 def test_the_renderers_process_shares_only_its_channel() -> None:
     """The server imports nothing of the renderer's process, and that process nothing of the server but SHARED."""
-    worker, server = "service.worker", ("service.requests", "service.renders", "service.renderers", "service.streams")
+    worker, rooms = "service.worker", "requests renders renderers streams routes state app launch storage"
+    server = [f"service.{room}" for room in rooms.split()]
     for module, imported in graph().items():
         for other in imported:
             said = f"{module} imports {other}"
-            if within(module, *server, "service.routes", "service.state", "service.app", "service.storage"):
+            if within(module, *server):
                 assert not within(other, worker, "gpu"), said
             if within(module, worker) and within(other, "service"):
                 assert within(other, worker, *SHARED_BY_PROCESSES), said

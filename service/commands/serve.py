@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 def run(arguments: argparse.Namespace) -> int:
     config = configuration(host=arguments.host, port=arguments.port)
-    from service import app
+    from service import launch
     from service.logs import setup
 
     secrets = [*config.api_key, *config.callback_secret]
@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     if (closed := _closed(config.data_dir)) is not None:
         log.warning(CLOSED.format(user=os.geteuid(), owner=closed.stat().st_uid, folder=closed))
 
-    return app.run(config)
+    return launch.run(config)
 
 
 def _closed(folder: Path) -> Path | None:

@@ -2,6 +2,7 @@
 
 guard              who may send requests, from which hosts and pages
 keys               the owner of the key that a request carries
+listener           the socket that the server listens on
 connections        connections below HTTP
 connection_limits  bounds on the number of connections, and on how long one may stand still
 compression        what everybody may read, in fewer bytes

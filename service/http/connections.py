@@ -16,30 +16,13 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.http.connection_limits import Room
 
-BACKLOG = 2048
 JOINED = 16 * 1024  # bytes; longer pieces are written as they are, as joining them would copy them
 # Unsent bytes allowed besides the largest piece. Answers and frames wait for the bytes before them, but pongs do not:
 # uvicorn answers every ping at once, even for a client that reads nothing.
 MOST_BESIDE = 1 << 20
-# TCP keep-alive: a peer that vanished without closing is noticed after two minutes.
-PROBE_AFTER_S, PROBE_EVERY_S, PROBES = 60, 15, 4
 RESET = struct.pack("ii", 1, 0)  # SO_LINGER: close at once, with a reset
 
 log = logging.getLogger(__name__)
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A listening socket whose options each accepted connection inherits. Raises OSError."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.create_server((host, port), family=family, backlog=BACKLOG)
-    # asyncio sets TCP_NODELAY only for sockets of a stated protocol. Without it an answer in two writes waits 40 ms
-    # for the client's delayed acknowledgement of the first.
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, PROBE_AFTER_S)
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, PROBE_EVERY_S)
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, PROBES)
-    return listener
 
 
 class JoinedWrites(asyncio.Transport):

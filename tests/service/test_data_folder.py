@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 import uvicorn
 
-from service import app
+from service import launch
 from service.config import Config
 from service.problems import Unavailable
 from service.storage import data_lock, database
@@ -136,7 +136,7 @@ def test_a_second_server_is_refused(
 ) -> None:
     monkeypatch.setattr(data_lock, "WAIT_S", 0.1)
     monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: pytest.fail("it was started"))
-    assert app.run(Config(port=0, data_dir=tmp_path)) == 1
+    assert launch.run(Config(port=0, data_dir=tmp_path)) == 1
     for part in (f"process {other.pid} on", "SUNBOX_DATA_DIR", str(tmp_path)):
         assert part in caplog.text
     assert "Traceback" not in caplog.text

@@ -20,7 +20,7 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import app
+from service import launch
 from service.assets import AssetStore
 from service.config import Config
 from service.http.downloads import Downloads, FileAnswer
@@ -233,7 +233,7 @@ def test_a_damaged_file_is_told_of(
     with pytest.raises(Unavailable, match="disk"):
         saved.names("scenes")[0]
     monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: pytest.fail("it was started"))
-    assert app.run(Config(port=0, data_dir=tmp_path)) == 1
+    assert launch.run(Config(port=0, data_dir=tmp_path)) == 1
     assert str(file) in caplog.text and "backup" in caplog.text and "Traceback" not in caplog.text
     assert file.read_bytes() == nonsense
 

@@ -18,7 +18,7 @@ import httpx
 import pytest
 import uvicorn
 
-from service import app
+from service import app, launch
 from service.config import GIB, MAX_PIXELS, MIB, Config
 from service.logs import setup
 from service.routes.metrics import scrape
@@ -123,7 +123,7 @@ def test_serving_everybody_without_a_key_is_warned_of(
     monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: sockets[0].close())
     for host, key, warned in (("0.0.0.0", [], True), ("127.0.0.1", [], False), ("0.0.0.0", ["secret"], False)):
         caplog.clear()
-        app.run(Config(host=host, port=0, api_key=key, data_dir=tmp_path))
+        launch.run(Config(host=host, port=0, api_key=key, data_dir=tmp_path))
         assert ("SUNBOX_API_KEY" in caplog.text) is warned
 
 

@@ -219,12 +219,12 @@ def test_leftovers_are_cleared_away(kept: Storage, tmp_path: Path) -> None:
 def test_a_server_clears_away_what_a_crash_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import uvicorn
 
-    from service import app
+    from service import launch
 
     (tmp_path / "assets").mkdir()
     (tmp_path / "assets" / ".abcd.tmp").write_bytes(b"half")
     monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: sockets[0].close())
-    app.run(Config(port=0, data_dir=tmp_path))
+    launch.run(Config(port=0, data_dir=tmp_path))
     assert not list((tmp_path / "assets").iterdir())
 
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -101,27 +102,69 @@ class Options:
     nice: int = 0  # steps of niceness above the server's
 
 
+class Begun:
+    """A process that was started, and to which nobody listens yet. Raises OSError where none can be started."""
+
+    def __init__(self, options: Options, lifeline: int | None = None) -> None:
+        """`lifeline`: the end of a pipe, whose other end the server holds as long as it lives."""
+        self.at, self.heartbeat, self.oom_kills = time.monotonic(), _Watched(), _oom_kills()
+        self.end, theirs = channel.pair()
+        try:
+            self.process = _spawn(theirs, self.heartbeat.descriptor, options, lifeline)
+        finally:
+            theirs.close()
+            os.close(self.heartbeat.descriptor)
+        self.heartbeat.begin(self.process.pid)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.end.close()
+        self.heartbeat.close()
+
+
+class EarlyStart:
+    """A `Start` whose first process is started now, so that it loads while the server does, which takes as long."""
+
+    def __init__(self, options: Options) -> None:
+        self._options, self._lifeline = options, os.pipe()
+        self._begun: Begun | None = None
+        with suppress(OSError):  # the keeper tries again, and says what was wrong
+            self._begun = Begun(options, self._lifeline[0])
+
+    def __call__(
+        self, received: Callable[[Any], None], lost: Callable[[], None], lifeline: int | None = None
+    ) -> RendererProcess:
+        begun, self._begun = self._begun, None
+        return Process(self._options, received, lost, lifeline, begun)
+
+    def close(self) -> None:
+        """End the process, where nobody has asked for it."""
+        if self._begun is not None:
+            self._begun.kill()
+        for end in self._lifeline:
+            os.close(end)
+
+
 class Process:
     """Calls `received` with each message of the process, and `lost` once when its end of the channel is closed."""
 
     def __init__(
-        self, options: Options, received: Callable[[Any], None], lost: Callable[[], None], lifeline: int | None = None
+        self,
+        options: Options,
+        received: Callable[[Any], None],
+        lost: Callable[[], None],
+        lifeline: int | None = None,
+        begun: Begun | None = None,
     ) -> None:
-        """`lifeline`: the end of a pipe, whose other end the server holds as long as it lives."""
-        self.began = time.monotonic()
+        """`begun`: the process, where it was started with these options before; `lifeline` is as for `Begun`."""
+        begun = begun or Begun(options, lifeline)
+        self.began, self.heartbeat, self._options = begun.at, begun.heartbeat, options
         self.ready = False
         self.unable = False  # to render, as it says itself
-        self.heartbeat, self._options = _Watched(), options
         self._condemned: Cause | None = None
-        self._oom_kills = _oom_kills()
-        ours, theirs = channel.pair()
-        try:
-            self._process = _spawn(theirs, self.heartbeat.descriptor, options, lifeline)
-        finally:
-            theirs.close()
-            os.close(self.heartbeat.descriptor)
-        self.heartbeat.begin(self._process.pid)
-        self.link = Channel(ours, received, lost)
+        self._oom_kills, self._process = begun.oom_kills, begun.process
+        self.link = Channel(begun.end, received, lost)
 
     @property
     def lived_s(self) -> float:

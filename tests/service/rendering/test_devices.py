@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from gpu import Renderer, devices, software_device
-from service import app
 from service import config as configs
+from service import launch
 from service.config import Config, ConfigError, load_config
 from service.ipc import channel
 from service.renderers.local import process
@@ -33,7 +33,7 @@ GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "softwa
 def five_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(configs, "cores", lambda: 5)
     monkeypatch.setattr(seating, "cores", lambda: 5)
-    monkeypatch.setattr(app, "cores", lambda: 5)
+    monkeypatch.setattr(launch, "cores", lambda: 5)
 
 
 def test_one_renderer_where_nothing_is_said() -> None:
@@ -66,11 +66,11 @@ def test_more_renderers_than_cores_are_slow_and_have_one_each(
 
     config = load_config(devices="llvmpipe:7")
     assert [seat.options.cores for seat in seats(config, 1000)] == [1] * 7
-    monkeypatch.setattr(app, "missing_device", lambda config: None)
-    monkeypatch.setattr(app, "listen", taken)
+    monkeypatch.setattr(launch, "missing_device", lambda config: None)
+    monkeypatch.setattr(launch, "listen", taken)
     for value, warned in (("llvmpipe:7", True), ("llvmpipe:5", False), ("0,1", False)):
         caplog.clear()
-        assert app.run(load_config(devices=value)) == 1
+        assert launch.run(load_config(devices=value)) == 1
         assert ("more renderers on the processor than it has cores" in caplog.text) is warned
 
 
