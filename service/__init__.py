@@ -5,6 +5,7 @@ launch     how a server starts
 cli        the command line; `commands` has a module for each command
 config     every limit, and the SUNBOX_* variables that set it
 callback_hosts  where callbacks may be sent
+quantities  sizes and times, as its fields have them
 containers  whether this process is in one
 problems   the errors that callers see, with their HTTP statuses
 colorimetry  sRGB and linear Rec.709

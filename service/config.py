@@ -11,11 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
-    ByteSize,
     ConfigDict,
     Field,
-    TypeAdapter,
     ValidationError,
     ValidationInfo,
     field_validator,
@@ -24,6 +21,7 @@ from pydantic import (
 
 from service.callback_hosts import checked_hosts, checked_secrets
 from service.containers import in_container
+from service.quantities import Bytes, Seconds
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 2 GiB
 MIB, GIB = 2**20, 2**30
@@ -45,20 +43,6 @@ PREFIX = "SUNBOX_"  # how the names of all variables begin, in capitals or not
 WORDS = (
     "allowed_hosts", "allowed_origins", "api_key", "callback_hosts", "callback_secret", "devices", "trusted_proxies",
 )  # fmt: skip
-
-
-def _size(value: Any) -> Any:
-    """The bytes that a size with a unit stands for, as "512 MiB" or "10GB"; anything else as it is."""
-    if not isinstance(value, str) or not re.search("[A-Za-z]", value):
-        return value
-    try:
-        return int(_SIZE.validate_python(value))
-    except ValidationError:
-        raise ValueError(f"{value!r} is no size; write bytes, or a number with a unit, as 512 MiB or 10 GB") from None
-
-
-_SIZE, Bytes = TypeAdapter(ByteSize), Annotated[int, BeforeValidator(_size)]
-Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class ConfigError(Exception):

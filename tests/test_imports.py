@@ -34,7 +34,7 @@ LARGE_CLASSES = {
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems", "service.callback_hosts", "service.containers"},
+    {"service.problems", "service.callback_hosts", "service.containers", "service.quantities"},
     {"service.config"},
     {"service.views", "service.displays", "service.colorimetry"},
     {"service.system"},
