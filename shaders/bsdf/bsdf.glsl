@@ -120,10 +120,9 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     return r;
 }
 
-// Samples uniformly over the hemisphere, or over the sphere where the material transmits; perfectly specular lobes are
-// sampled as always. Of a uniform direction `scatter` has only the density.
-LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    LobeSample r = bsdf_sample(s, wo, u_lobe, u);
+// Makes a sample of bsdf_sample one that is uniform over the hemisphere, or over the sphere where the material transmits;
+// those of perfectly specular lobes stay as they are. Of a uniform direction `scatter` has only the density.
+void bsdf_make_uniform(Surface s, vec3 wo, vec2 u, inout LobeSample r) {
     if (!r.is_delta && !bsdf_enters(r)) {
         r.coated = false;
         r.wi = sampling_hemisphere(u);
@@ -152,7 +151,6 @@ LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
         }
 #endif
     }
-    return r;
 }
 
 // The perfectly specular lobes of a surface, each as bsdf_sample gives it; those that it lacks have the chance 0. The

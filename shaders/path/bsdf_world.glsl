@@ -14,8 +14,9 @@ Asked bsdf_ask(Interaction here, vec3 d) {
 
 // Samples a direction in the shading frame as the estimator does.
 LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    if (ESTIMATOR == ESTIMATOR_UNIFORM) return bsdf_sample_uniform(s, wo, u_lobe, u);
-    return bsdf_sample(s, wo, u_lobe, u);
+    LobeSample lobe = bsdf_sample(s, wo, u_lobe, u);
+    if (ESTIMATOR == ESTIMATOR_UNIFORM) bsdf_make_uniform(s, wo, u, lobe);
+    return lobe;
 }
 
 // The value and the density of a direction.
