@@ -19,8 +19,9 @@ from starlette.types import Message, Receive, Scope, Send
 from service.config import Config
 from service.http import connection_limits, guard
 from service.http.connection_limits import Room, Watch
-from service.http.connections import connection_class, listen
+from service.http.connections import connection_class
 from service.http.guard import Guard, open_for_health, turning_away
+from service.http.listener import listen
 from service.problems import Unavailable
 from service.routes.errors import respond
 

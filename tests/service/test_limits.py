@@ -127,7 +127,9 @@ CODE = {
     "system/executors.py run_in_executor": "the thread of one client",
     "system/memory.py shares = Shares": SHARES,
     "worker/division/home.py EACH": "leases of one renderer",
+    "worker/helpers/used_kernels.py MOST": "a record: the latest put the oldest out",
     "worker/view/view_tables.py MOST": "a cache: what makes room is made again",
+    "worker/warming.py ProcessPoolExecutor": "of the command alone",
 }
 OF_ONE = "of one request, file or scene"
 SETTINGS = {

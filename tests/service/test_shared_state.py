@@ -53,6 +53,7 @@ CHANGED = {
     "system/priority.py _steps": "set once, before there are threads",
     "system/shared_memory.py _blocks": "a lock for changes; listed by `copy`, which is one step of the interpreter",
     "worker/view/view_tables.py _baked": "of the renderer's thread",
+    "worker/warming.py _compiling": "of a process with one thread",
 }
 # Classes for any thread that have no lock, and why they need none.
 WITHOUT = {
