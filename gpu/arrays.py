@@ -128,6 +128,8 @@ class SceneArrays:
     textures: TextureArrays | None = None
     radiance_scale: float = 1.0  # about the largest radiance a picture of it will hold; a power of two
     origin: Vec3 = (0.0, 0.0, 0.0)
+    # By which layers number the materials, from 0; None: as they stand here.
+    material_numbers: tuple[int, ...] | None = None
 
     @property
     def corner_colors(self) -> np.ndarray:
@@ -173,11 +175,17 @@ class SceneEdit:
     environment_map: EnvironmentArrays | None = None  # another one in the place of one
     # Of the same lengths as before, except that the scene's tree may differ in length where there are instances.
     moved: MovedArrays | None = None
+    material_numbers: tuple[int, ...] | None = None  # as many as materials
 
     @property
     def needs_kernel(self) -> bool:
         """Whether the scene may need another kernel after it. Of an edit of the camera, the camera's flags say."""
-        return not self._given.keys() <= {"camera", "environment"}
+        return not self._given.keys() <= {"camera", "environment", "material_numbers"}
+
+    @property
+    def restarts(self) -> bool:
+        """Whether pictures of the scene begin again after it: all but the numbers change what is seen."""
+        return not self._given.keys() <= {"material_numbers"}
 
     @property
     def bytes(self) -> int:
@@ -201,7 +209,8 @@ class SceneEdit:
         changes: dict[str, Any] = dict(self.moved or {})
         if self.materials is not None and len(self.materials) != len(arrays.materials):
             raise ValueError(f"{len(self.materials)} materials for a scene of {len(arrays.materials)}")
-        changes |= {n: v for n, v in self._given.items() if n in ("camera", "materials", "microfacets")}
+        own = ("camera", "materials", "microfacets", "material_numbers")
+        changes |= {name: value for name, value in self._given.items() if name in own}
         if self.texture_words is not None and arrays.textures is not None:
             changes["textures"] = replace(arrays.textures, words=self.texture_words)
         lit = arrays.environment if self.environment_map is None else self.environment_map

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,11 +68,14 @@ class FirstHit:
             if self._row >= height:
                 self.samples, self._row = self.samples + 1, 0
 
-    def read(self, aov: str) -> np.ndarray:
-        """(height, width, channels) float32 of albedo, normal, depth, incidence (degrees), or one of ID_AOVS."""
+    def read(self, aov: str, numbers: Sequence[int] | None = None) -> np.ndarray:
+        """(height, width, channels) float32 of albedo, normal, depth, incidence (degrees), or one of ID_AOVS.
+        `numbers` are those of the scene's materials, from 0, where they are not their places."""
         if aov in ID_AOVS:
             hits = np.frombuffer(self.buffers[Slot.FIRST_HITS].read(), np.uint32)
             ids: np.ndarray = hits.reshape(self._size[1], self._size[0], 4)[..., ID_AOVS.index(aov), None]
+            if aov == "material_id" and numbers is not None:
+                ids = np.array([0, *(number + 1 for number in numbers)], np.uint32)[ids]
             return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
         if aov not in ("depth", "incidence"):
             values = self._vectors(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)

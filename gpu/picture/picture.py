@@ -225,10 +225,10 @@ class Picture:
         self._need_samples()
         if aov in COVERAGE_AOVS:
             self.trace_guides(coverage=True)
-            return self._readout.coverage.read(aov)
+            return self._readout.coverage.read(aov, self.scene.arrays.material_numbers)
         if aov in FIRST_HIT_AOVS:
             self.trace_guides()
-            return self._readout.first_hit.read(aov)
+            return self._readout.first_hit.read(aov, self.scene.arrays.material_numbers)
         return self._readout.variance() if aov == "variance" else self._readout.color()
 
     def depth(self) -> np.ndarray | None:

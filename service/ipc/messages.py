@@ -33,6 +33,9 @@ class SceneEditData(Protocol):
     def environment_map(self) -> object: ...
 
     @property
+    def restarts(self) -> bool: ...
+
+    @property
     def bytes(self) -> int: ...
 
     def then(self, later: Any) -> SceneEditData: ...
@@ -113,9 +116,7 @@ def driver_of(info: Mapping[str, Any]) -> str:
 class Update:
     """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
-    `settings` are the arguments of gpu.RenderSettings. These, a scene or an edit of it start accumulation again;
-    `stop` and `denoise` do not.
-    """
+    `settings` are the arguments of gpu.RenderSettings."""
 
     task: int
     generation: int
@@ -141,7 +142,8 @@ class Update:
 
     @property
     def restarts(self) -> bool:
-        return self.scene is not None or self.settings is not None or self.edit is not None
+        """Whether accumulation starts again."""
+        return self.scene is not None or self.settings is not None or (self.edit is not None and self.edit.restarts)
 
     def then(self, later: Update) -> Update:
         """This update and a later one of the same task as one."""

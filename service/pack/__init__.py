@@ -7,6 +7,7 @@ microfacets         the terms of `microfacet`, and the tables for those that hav
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with their probabilities, and environments with the tables that draw from them
 textures            images -> texels, and the numbers of materials that read them
+worn                what is drawn of a scene, by what its shapes wear
 textured_emission   the mean emission of textured shapes that shine
 picture_bytes       the bytes of a picture
 parameter_edit      the edit that changes such parameters
@@ -23,6 +24,7 @@ from service.pack.parameter_edit import parameter_edit
 from service.pack.parameters import pack_camera, pack_materials
 from service.pack.picture_bytes import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES
 from service.pack.scene import Packed, lone_material, pack, pack_material
+from service.pack.worn import places, renamed, worn
 
 __all__ = [
     "CUBE_FACES",
@@ -38,7 +40,10 @@ __all__ = [
     "pack_materials",
     "pack_microfacets",
     "parameter_edit",
+    "places",
+    "renamed",
     "scene_edit",
     "warm_builder",
     "warm_light_tree",
+    "worn",
 ]

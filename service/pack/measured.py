@@ -38,24 +38,27 @@ class PackedMeasured:
 
 
 def pack_measured(
-    scene: Scene, assets: Assets, materials: np.ndarray, cache: PackCache | None, limits: TexelLimits | None
-) -> PackedMeasured:
-    """Completes the `layout.Material` records of measured materials. Raises InvalidDocument."""
-    wanted = {i: m.asset for i, m in enumerate(scene.materials.values()) if isinstance(m, MeasuredMaterial)}
+    scene: Scene, drawn: Scene, assets: Assets, materials: np.ndarray, cache: PackCache | None,
+    limits: TexelLimits | None,
+) -> PackedMeasured:  # fmt: skip
+    """Completes the `layout.Material` records of what is `drawn` of a scene. Raises InvalidDocument, for files of
+    what is not drawn as well."""
+    loaded = _loaded(scene, _files(scene), assets, limits)
+    wanted = _files(drawn)
     if not wanted:
         return PackedMeasured(np.zeros((0, 4), np.uint32))
-    found = _loaded(scene, wanted, assets, limits)
+    found = {asset: loaded[asset] for asset in wanted.values()}
     for i, asset in wanted.items():
         materials[i]["base_color"] = found[asset].albedo
         materials[i]["anisotropic"] = layout.TEXTURED if len(found[asset].phi) > 1 else 0.0
-    count = len(scene.materials)
+    count = len(drawn.materials)
     keyed = all(map(lasting, found))
     key = f"{count} " + " ".join(f"{i}:{asset}" for i, asset in wanted.items()) if keyed else ""
     if cache is None or not keyed:
         packed = PackedMeasured(_words(count, wanted, found), key)
     else:
         packed = cache.get(("measured", key), lambda: PackedMeasured(_words(count, wanted, found), key))
-    names = list(scene.materials)
+    names = list(drawn.materials)
     told = {asset: names[i] for i, asset in reversed(wanted.items())}
     said = (f"/materials/{escaped(told[a])}/asset: {each}" for a, data in found.items() for each in data.warnings)
     return PackedMeasured(packed.words, key, tuple(said))
@@ -66,6 +69,11 @@ def keep_measured(before: np.ndarray, after: np.ndarray) -> None:
     same = after["model"] == NUMBERS["measured"]
     for member in ("base_color", "anisotropic"):
         after[member][same] = before[member][same]
+
+
+def _files(scene: Scene) -> dict[int, str]:
+    """The assets of its measured materials, by the places of these."""
+    return {i: m.asset for i, m in enumerate(scene.materials.values()) if isinstance(m, MeasuredMaterial)}
 
 
 def _loaded(

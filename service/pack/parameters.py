@@ -93,7 +93,7 @@ def pack_camera(camera: AnyCamera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
 
 
 def pack_materials(scene: Scene) -> np.ndarray:
-    """`layout.Material` records in the order of the document's names, unused ones included."""
+    """`layout.Material` records in the order of the scene's materials."""
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     records["number"] = np.arange(len(records))
     records["film_weight"] = 1.0  # of models that have no weight

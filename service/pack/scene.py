@@ -31,6 +31,7 @@ from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.heights import height_fields
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
+from service.pack.worn import places, worn
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene import Material, PerspectiveCamera, Scene
 from service.scene.environment import Environment
@@ -91,15 +92,16 @@ def pack(
     scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None,
     shared: PackCache | None = None,
 ) -> Packed:  # fmt: skip
-    """The renderer's arrays for `scene`.
+    """The renderer's arrays for what is drawn of `scene`. What is not drawn is checked as well.
 
     `cache` belongs to a document that is being edited. `shared` caches environments and measured reflection
     of other documents, without the results of edits, which are not requested again.
     Raises InvalidDocument with pointers from the scene's root. Slow with geometry: not for an event loop.
     """
+    whole, scene = scene, worn(scene)
     materials = pack_materials(scene)
-    measured = pack_measured(scene, assets, materials, cache or shared, limits)
-    textures, uses, texels, texture_warnings = pack_textures(scene, assets, cache, limits)
+    measured = pack_measured(whole, scene, assets, materials, cache or shared, limits)
+    textures, uses, texels, texture_warnings = pack_textures(whole, scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
     emissive[dark(uses, texels)] = False
     built = _geometry(scene, emissive, assets, cache, limits)
@@ -121,6 +123,7 @@ def pack(
         spaces=shape_spaces(scene, built.origin),
         bodies=bodies(scene),
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
+        material_numbers=places(whole, scene),
     )
     odd = (*odd_meshes(built.meshes.odd, materials, emissive), *odd_media(scene, materials, built.meshes.odd))
     return Packed(

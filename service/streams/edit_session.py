@@ -194,6 +194,9 @@ class EditSession:
             if old is None or edit is None:
                 return replace(update, scene=packed.arrays)
             return replace(update, base=old.generation, edit=edit)
-        parts = {"camera": touched.camera, "materials": touched.materials, "environment": touched.environment}
+        if touched.may_be_refused:  # for what is not drawn: its answer is all that is wanted
+            self._reader.memory.release(self._reader.pack(new.scene, self._cache, owner=self._owner))
+        names = ("camera", "materials", "environment", "numbers")
+        parts = {name: getattr(touched, name) for name in names}
         edit = parameter_edit(self._arrays, new.scene, **parts) if any(parts.values()) else None
         return replace(update, base=old.generation, edit=edit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from service.pack import places, renamed, worn
 from service.scene import CubemapEnvironment, Scene, SkyEnvironment
 from service.scene.material import Material, stretches
 from service.scene.shape import MeshShape
@@ -15,24 +16,40 @@ BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for
 @dataclass(frozen=True)
 class SceneDiff:
     """`whole`: the scene must be packed again; else only what is named differs. `may_be_refused`: packing could be
-    refused where it was not before, as there are other files or more to store."""
+    refused where it was not before, as there are other files or more to store, which nothing has to be drawn with.
+    `numbers`: those of the materials in layers."""
 
     whole: bool = False
     may_be_refused: bool = False
     camera: bool = False
     materials: bool = False
     environment: bool = False
+    numbers: bool = False
 
 
 def scene_diff(old: Scene, new: Scene) -> SceneDiff:
-    if _skeleton(old) != _skeleton(new):
-        may_be_refused = any(part(old) != part(new) for part in (_files, _asked, _number))
+    a, b = worn(old), worn(new)
+    other_numbers = places(old, a) != places(new, b)
+    if len(a.materials) == len(b.materials):
+        b = renamed(b, list(a.materials))  # by which nothing looks different
+    beside = _beside(old, a) != _beside(new, b)
+    if _skeleton(a) != _skeleton(b):
+        may_be_refused = beside or any(part(a) != part(b) for part in (_files, _asked, _number))
         return SceneDiff(whole=True, may_be_refused=may_be_refused)
     return SceneDiff(
-        camera=old.camera != new.camera,
-        materials=old.materials != new.materials,
-        environment=old.environment != new.environment,
+        may_be_refused=beside,
+        camera=a.camera != b.camera,
+        materials=a.materials != b.materials,
+        environment=a.environment != b.environment,
+        numbers=other_numbers,
     )
+
+
+def _beside(scene: Scene, drawn: Scene) -> tuple[object, ...]:
+    """What is not drawn and could be refused all the same: textures, and what materials ask of these and of files."""
+    textures = {name: texture for name, texture in scene.textures.items() if name not in drawn.textures}
+    asked = [(getattr(m, "asset", None), _looks(m)) for n, m in scene.materials.items() if n not in drawn.materials]
+    return textures, [each for each in asked if any(each)]
 
 
 def _number(scene: Scene) -> int:

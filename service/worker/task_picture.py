@@ -224,7 +224,7 @@ class TaskPicture:
         residency, latest = self.residency, self.frames.denoising.latest
         if update.scene is not None or update.settings is not None:
             self.under_hand.release()
-        elif update.edit is not None and self.tracker.interactive and residency.loaded is not None:
+        elif update.restarts and self.tracker.interactive and residency.loaded is not None:
             self.under_hand.keep(residency.ladder, latest.pixels if latest else None)
 
     def evict(self) -> None:

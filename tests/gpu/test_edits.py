@@ -40,6 +40,7 @@ PARTS: dict[str, Any] = {
     "environment": (0.5, 2.0),
     "environment_map": environment(3.0),
     "moved": {"lights": LIGHTS},
+    "material_numbers": (1, 0),
 }
 
 
@@ -67,9 +68,13 @@ def test_the_later_edit_wins_and_moves_are_joined() -> None:
     assert all(getattr(once, f.name) is getattr(twice, f.name) for f in fields(SCENE) if f.name != "environment")
 
 
+def test_only_numbers_leave_pictures_as_they_are() -> None:
+    assert [name for name, value in PARTS.items() if not SceneEdit(**{name: value}).restarts] == ["material_numbers"]
+
+
 def test_only_camera_and_turn_need_no_other_kernel() -> None:
     need = {name for name, value in PARTS.items() if SceneEdit(**{name: value}).needs_kernel}
-    assert need == PARTS.keys() - {"camera", "environment"}
+    assert need == PARTS.keys() - {"camera", "environment", "material_numbers"}
 
 
 def test_bytes_are_those_of_what_may_be_large() -> None:

@@ -51,3 +51,10 @@ def test_shares_add_up_where_there_are_more_things_than_ranks(gpu: Renderer) -> 
     single = found["material_coverage"]
     np.testing.assert_allclose(np.where(single[..., 0] == 1, single[..., 1], 0).sum(-1), alpha, atol=1e-5)
     np.testing.assert_allclose(np.where(single[..., 0] == -1, single[..., 1], 0).sum(-1), 1 - alpha, atol=1e-5)
+
+
+def test_materials_have_the_numbers_of_the_document(gpu: Renderer) -> None:
+    """Not those of their records, which stand in the order of shapes."""
+    found, _ = coverage(gpu, [{**BACK, "material": "veil"}, {**VEIL, "material": "a"}], 8)
+    assert (found["material_coverage"][..., 0, 0] == 1).all(), "the wall in front is `a`, the first one"
+    assert (found["shape_coverage"][..., 0, 0] == 2).all()

@@ -40,6 +40,7 @@ def scene_edit(old: SceneArrays, new: SceneArrays) -> SceneEdit | None:
         environment=None if lit is None else (lit.rotation, lit.scale),
         environment_map=None if _same(old.environment, lit) else lit,
         moved=cast(MovedArrays, moved),
+        material_numbers=new.material_numbers,
     )
 
 

@@ -34,12 +34,13 @@ LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
 
 
 def pack_textures(
-    scene: Scene, assets: Assets, cache: PackCache | None, limits: TexelLimits | None
+    scene: Scene, drawn: Scene, assets: Assets, cache: PackCache | None, limits: TexelLimits | None
 ) -> tuple[TextureArrays | None, list[TextureReference], PackedTexels, list[str]]:
-    """The renderer's arrays or None, the references that they serve, and warnings. Raises InvalidDocument."""
+    """The renderer's arrays or None of what is `drawn` of a scene, the references that they serve, and warnings.
+    Raises InvalidDocument, for what is not drawn as well."""
     images = images_of(scene, assets)
-    uses = uses_of(scene, images)
-    check_channels(uses, images)
+    check_channels(uses_of(scene, images), images)
+    uses = uses_of(drawn, images)
     used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.name for use in uses if isinstance(use.texture, ImageTexture)}
     averaged = {use.key: use.averaged for use in uses if isinstance(use.texture, ImageTexture) and use.averaged}
@@ -48,8 +49,8 @@ def pack_textures(
         return None, uses, texels, []
     slots = _slots(uses)
     stops = room_for_stops(uses)
-    words = _words(len(scene.materials), uses, slots, texels, stops)
-    write_uses(words, scene, slots)
+    words = _words(len(drawn.materials), uses, slots, texels, stops)
+    write_uses(words, drawn, slots)
     key = " ".join(f"{kept}@{first}:{averaged.get(kept)}" for kept, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key, stops)

@@ -67,7 +67,7 @@ class Residency:
                     self.make_room(growth)
                 self.loaded.scene.edit(edited.arrays, edited.flags)
             if update.settings is None:
-                if update.edit is not None:
+                if update.restarts:
                     self.ladder.reset()
                 return None
             old = self.full.settings

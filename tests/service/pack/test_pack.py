@@ -168,10 +168,12 @@ def test_opacity_and_sides_are_what_alpha_and_its_cutoff_say(given, opacity, sid
     assert (record["opacity"], record["emission_sides"]) == (opacity, sides)
 
 
-def test_materials_keep_the_order_of_the_document():
+def test_materials_stand_as_shapes_wear_them_and_keep_the_numbers_of_the_document():
     arrays = packed(sphere(material="lamp"), sphere()).arrays
-    assert [m["emission"][0] for m in arrays.materials] == [0, 4]
-    assert arrays.spheres["material"].tolist() == [1, 0]
+    assert [m["emission"][0] for m in arrays.materials] == [4, 0]
+    assert arrays.spheres["material"].tolist() == [0, 1] and arrays.material_numbers == (1, 0)
+    lone = packed(sphere(material="lamp")).arrays
+    assert len(lone.materials) == 1 and lone.material_numbers == (1,), "nothing else is drawn"
 
 
 def test_sphere_turned_and_scaled_evenly_stays_a_sphere():

@@ -46,7 +46,8 @@ class Broken(Images):
 
 def textured(**assets: str) -> dict[str, object]:
     materials = {f"m{k}": {"type": "diffuse", "albedo": {"texture": name}} for k, name in enumerate(assets)}
-    return document([QUAD], materials, textures={name: {"asset": asset} for name, asset in assets.items()})
+    shapes = [{**QUAD, "material": name} for name in materials]
+    return document(shapes, materials, textures={name: {"asset": asset} for name, asset in assets.items()})
 
 
 def test_two_images_are_read_at_a_time() -> None:

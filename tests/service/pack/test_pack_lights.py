@@ -139,13 +139,14 @@ def test_lights_and_shapes_name_each_other():
         LightKind.POINT: 1, LightKind.ENVIRONMENT: 1, LightKind.SPOT: 0, LightKind.DIRECTIONAL: 0,
         LightKind.CYLINDER: 1,
     }  # fmt: skip
+    (lit,) = np.flatnonzero(arrays.materials["emission"].any(axis=1))
     for i, light in enumerate(arrays.lights):
         if name := KINDS.get(LightKind(int(light["kind"]))):
             shape = getattr(arrays, name)[light["index"]]
-            assert shape["light"] == i and shape["material"] == light["material"] == 1
+            assert shape["light"] == i and shape["material"] == light["material"] == lit
     for name in KINDS.values():
         shapes = getattr(arrays, name)
-        assert np.array_equal(shapes["light"] != layout.NONE, shapes["material"] == 1)
+        assert np.array_equal(shapes["light"] != layout.NONE, shapes["material"] == lit)
     lamp = arrays.lights[arrays.lights["kind"] == LightKind.POINT][0]
     assert lamp["position"].tolist() == [1, 2, 3] and lamp["intensity"].tolist() == [1, 2, 3]
 

@@ -12,6 +12,7 @@ from service.scene import Scene, merge_patch, parse_scene
 from service.streams.scene_diff import SceneDiff, scene_diff
 from tests.serving import SCENE
 
+TEXTURE = {"asset": "sha256:" + "2" * 64}
 IMAGE = {"type": "image", "asset": "sha256:" + "1" * 64}
 MESH = {"type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]], "material": "floor"}
 BASE = {**SCENE, "shapes": [*SCENE["shapes"], MESH]}
@@ -46,20 +47,46 @@ def scene(patch: Any) -> Scene:
         ({"lights": [{**SCENE["lights"][0], "intensity": 31}]}, SceneDiff(whole=True)),
         ({"materials": {"ball": {"emission": 1}}}, SceneDiff(whole=True)),
         ({"materials": {"ball": {"type": "diffuse", "albedo": 0.5}}}, SceneDiff(whole=True)),
-        ({"materials": {"another": {"type": "disney"}}}, SceneDiff(whole=True)),
+        ({"materials": {"another": {"type": "disney"}}}, SceneDiff()),  # that nothing wears
+        ({"textures": {"one": TEXTURE}}, SceneDiff(may_be_refused=True)),  # that nothing reads
         ({"shapes": BASE["shapes"][:2]}, SceneDiff(whole=True)),
         ({"shapes": [*SCENE["shapes"], {**MESH, "faces": [[0, 2, 1]]}]}, SceneDiff(whole=True)),
     ],
 )
 def test_change(patch: Any, expected: SceneDiff) -> None:
     found = scene_diff(scene({}), scene(patch))
-    assert replace(found, may_be_refused=False) == expected and found.whole >= found.may_be_refused
+    assert (replace(found, may_be_refused=False) if expected.whole else found) == expected
 
 
-def test_the_order_of_materials_counts() -> None:
-    """Shapes refer to them by place."""
+def test_the_order_of_materials_is_that_of_their_numbers() -> None:
     turned = parse_scene({**BASE, "materials": dict(reversed(BASE["materials"].items()))})
-    assert scene_diff(scene({}), turned).whole
+    assert scene_diff(scene({}), turned) == SceneDiff(numbers=True)
+
+
+def with_names(of: dict[str, str]) -> Scene:
+    """BASE with other names for its materials."""
+    materials = {of.get(name, name): each for name, each in BASE["materials"].items()}
+    shapes = [{**each, "material": of.get(each["material"], each["material"])} for each in BASE["shapes"]]
+    return parse_scene({**BASE, "materials": materials, "shapes": shapes})
+
+
+def test_names_of_materials_are_for_people() -> None:
+    assert scene_diff(scene({}), with_names({"ball": "Gold"})) == SceneDiff()
+    assert scene_diff(scene({}), with_names({"ball": "floor", "floor": "ball"})) == SceneDiff(), "they change places"
+    renamed = merge_patch(copy.deepcopy(BASE), {"materials": {"ball": None, "Gold": BASE["materials"]["ball"]}})
+    for shape in renamed["shapes"]:
+        shape["material"] = {"ball": "Gold"}.get(shape["material"], shape["material"])
+    found = scene_diff(scene({}), parse_scene(renamed))
+    assert not (found.whole or found.materials or found.may_be_refused), "a patch puts a new name at the end"
+
+
+def test_what_nothing_wears_may_be_refused_for_its_files() -> None:
+    bare = {"textures": {"one": TEXTURE}, "materials": {"spare": {"type": "diffuse", "albedo": 0.5}}}
+    read = {**bare, "materials": {"spare": {"type": "diffuse", "albedo": {"texture": "one"}}}}
+    file = {**bare, "materials": {"spare": {"type": "measured", "asset": "sha256:" + "3" * 64}}}
+    assert scene_diff(scene(bare), scene({**bare, "materials": {"spare": {"type": "disney"}}})) == SceneDiff()
+    for asking in (read, file):
+        assert scene_diff(scene(bare), scene(asking)) == SceneDiff(may_be_refused=True)
 
 
 def test_only_files_and_numbers_of_shapes_are_risky() -> None:

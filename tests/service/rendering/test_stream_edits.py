@@ -63,6 +63,27 @@ def test_an_update_patches_and_starts_again(client: Client) -> None:
     assert np.array_equal(client.finished()[1].array(), before)
 
 
+def test_names_and_what_nothing_wears_leave_the_picture_as_it_is(client: Client) -> None:
+    """A material gets another name, which a patch puts at the end, and another one comes that no shape wears."""
+    ball, floor = (SCENE["materials"][name] for name in ("ball", "floor"))
+    client.start(settings=ENDLESS, view={**RAW, "aov": "material_id"})
+    while (before := client.frame()).samples < 8:
+        pass
+    film = {"type": "openpbr", "thin_film_weight": 1, "subsurface_weight": 0.5}
+    names = {"ball": "Gold", "floor": "floor"}
+    shapes = [{**each, "material": names[each["material"]]} for each in SCENE["shapes"]]
+    patch = {"materials": {"ball": None, "spare": film, "Gold": ball}, "shapes": shapes}
+    client.say("update", generation=2, scene=patch)
+    after = client.frame(generation=2)
+    assert after.samples >= before.samples
+    numbers = {"floor": 1, "spare": 2, "Gold": 3}
+    was, now = (each.array()[..., 0] for each in (before, after))
+    assert set(np.unique(was)) >= {1, 2} and np.array_equal(now == numbers["Gold"], was == 1)
+    assert np.array_equal(now == numbers["floor"], was == 2)
+    client.say("update", generation=3, scene={"materials": {"floor": {**floor, "albedo": 0.2}}})
+    assert client.frame(generation=3).samples < after.samples, "that is seen"
+
+
 def test_limits_do_not_start_again(client: Client) -> None:
     client.start()
     client.finished()
