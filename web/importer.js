@@ -237,7 +237,7 @@ export class Importer {
     if (!info.variants && !info.animations) return { document: await fetchAssetScene(id), bounds };
     this.messages.hide("upload"); // it is here
     const { askPose } = await import("./model-pose.js");
-    const pose = await askPose(file, { id, ...info }, way === "add" ? "Add" : "Open");
+    const pose = await askPose(this.schema, file, { id, ...info }, way === "add" ? "Add" : "Open");
     return pose && fetchPosedScene(id, pose);
   }
 

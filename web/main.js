@@ -3,6 +3,7 @@
 import { boot } from "./boot.js";
 import { keyTable, makeCommands, watchButtons } from "./commands.js";
 import { DisplayControls } from "./panels/display-controls.js";
+import { changed } from "./document/changes.js";
 import { Editor } from "./document/editor.js";
 import { learnNames, sentence } from "./lib/format-text.js";
 import { watchDrops } from "./lib/drops.js";
@@ -60,7 +61,7 @@ const complain = (problem) => {
   messages.show("refusal", { title: problemText(problem, titles) });
 };
 
-const lastPicture = new LastPicture(find("last-picture"), find("preparing"));
+const lastPicture = new LastPicture(find("last-picture"));
 let editor = null;
 const { schema, library, name, scene, left } = await boot({
   keyDialog: find("key-dialog"),
@@ -185,16 +186,17 @@ const stream = new Stream({
 });
 
 const preparing = new Preparing({
-  stage: root,
   label: find("preparing"),
   begun: () => {
     status.blank();
     tellState();
   },
+  say,
   subject() {
     const { home, chosen } = editor.state;
-    const isOther = home !== page.paintedHome;
-    return { isOther, name: isOther ? titleOf(chosen) || "the scene" : "the change" };
+    if (home !== page.paintedHome) return { isOther: true, name: titleOf(chosen) || "the scene" };
+    const { scene } = page.wanted;
+    return { isOther: false, name: changed(page.paintedScene, scene, (name) => editor.titleOfMaterial(name)) };
   },
 });
 
@@ -230,7 +232,7 @@ const panel = new Panel(find, {
     replaceFile: importer.calls("replace"),
     takeTable: importer.calls("table"),
   },
-  paint: (image, material) => thumbnails.own(image, material),
+  paint: (image, material, isWorn) => thumbnails.own(image, material, isWorn),
   say,
   textureActs: textureActs({
     editor,
@@ -253,6 +255,7 @@ const shelf = new Shelf(find, {
     stage: root,
     outline: find("outline-list"),
     shapeAt: (x, y) => controller.shapeAt(x, y),
+    point: (shape) => controller.point(shape).catch(() => {}),
     prepare: () => controller.prepare().catch(() => {}),
     say,
   },
@@ -327,7 +330,7 @@ let saving = null;
 function save() {
   clearTimeout(saving);
   saving = null;
-  keepWork(essence(editor.steady));
+  keepWork(essence(editor.state));
 }
 addEventListener("pagehide", () => {
   if (saving !== null) save(); // what changed just before the page goes

@@ -1,9 +1,11 @@
-// How a model that moves or has variants is taken: which variant, which animation, at which time. A small picture shows it.
+// How a model that moves or has variants is taken: which variant, which animation, at which time. A small picture shows
+// it in its plain colours, for which the renderer prepares nothing that it has not for other models.
 
 import { ask as confirm } from "./lib/ask.js";
 import { element, freshId } from "./lib/dom.js";
 import { fetchPosedScene, renderPicture } from "./server/api.js";
 import { problemText } from "./server/problem-text.js";
+import { fields, materialModels, newMaterial } from "./server/schema.js";
 
 const STEPS = 200; // of the slider over an animation
 const SHOWN = { width: 320, height: 200, max_samples: 8, max_bounces: 3 };
@@ -17,9 +19,23 @@ function menu(id, label, none, names) {
   return { select, row: element("div", { class: "row pose" }, element("label", { for: id }, label), select) };
 }
 
-// The pose that the person takes, {} for the model as it was saved; null where they think better of it. `info` is what
-// the server says of the file, `action` what the button does.
-export async function askPose(file, { id, variants = [], animations = [] }, action) {
+// A scene in the plain material of a schema, with the first colour that each of its own materials has.
+function simple(scene, schema) {
+  const models = materialModels(schema);
+  const colored = ({ type }) => fields(schema, models[type]).find(({ widget }) => widget === "color");
+  const plain = newMaterial(schema);
+  const { name: to } = colored(plain);
+  const made = (material) => {
+    const { name, initial } = colored(material) ?? {};
+    return { ...plain, [to]: material[name] ?? initial ?? plain[to] };
+  };
+  const materials = Object.entries(scene.materials).map(([name, material]) => [name, made(material)]);
+  return { ...scene, materials: Object.fromEntries(materials) };
+}
+
+// The pose that the person takes, {} for the model as it was saved; null where they think better of it. `schema` is that of
+// scenes, `info` what the server says of the file, `action` what the button does.
+export async function askPose(schema, file, { id, variants = [], animations = [] }, action) {
   const own = freshId("pose");
   const variant = menu(`${own}-variant`, "Variant", "As it was saved", variants);
   const animation = menu(
@@ -38,7 +54,7 @@ export async function askPose(file, { id, variants = [], animations = [] }, acti
     ...(variant.select.value ? { variant: variant.select.value } : {}),
     ...(animation.select.value ? { animation: animation.select.value, time: time.value } : {}),
   });
-  const shown = new PosedPicture(id, picture, trouble);
+  const shown = new PosedPicture(schema, id, picture, trouble);
   const changed = () => {
     const end = duration();
     timing.hidden = !end;
@@ -74,8 +90,8 @@ class PosedPicture {
   #timer = null;
   #asked = null;
 
-  constructor(id, image, trouble) {
-    Object.assign(this, { id, image, trouble });
+  constructor(schema, id, image, trouble) {
+    Object.assign(this, { schema, id, image, trouble });
   }
 
   show(pose) {
@@ -96,7 +112,7 @@ class PosedPicture {
     this.image.setAttribute("aria-busy", "true");
     try {
       const { document } = await fetchPosedScene(this.id, this.#wanted, signal);
-      const blob = await renderPicture(document, SHOWN, signal);
+      const blob = await renderPicture(simple(document, this.schema), SHOWN, signal);
       URL.revokeObjectURL(this.image.src);
       this.image.src = URL.createObjectURL(blob);
       this.trouble.hidden = true;

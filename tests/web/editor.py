@@ -9,6 +9,9 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page
 
+from service.worker.view.under_hand import WORTH
+
+GUESSED = WORTH[-1][0]  # samples of a picture until which the one before has a part in it
 MENUS = {"save": ("#scene-menu", "#page-save"), "view": ("#view", "#view-menu")}
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 # Whether something comes to hold within some seconds: asked in the page, that costs next to nothing.
@@ -102,6 +105,12 @@ class Editor:
     def settled(self) -> list[float]:
         """The pixels after enough samples at full size that neither noise nor a guess is a reason to differ."""
         self.wait("a settled picture", lambda: self.page.evaluate(SOON, SETTLED))
+        return self.pixels()
+
+    def settled_alone(self) -> list[float]:
+        """The pixels once the picture before the edit has no part in them, to compare with a later one."""
+        self.settled()
+        self.wait("samples of its own", lambda: self.samples() >= GUESSED)
         return self.pixels()
 
     def differs(self, before: list[float], least: float = 4.0) -> bool:

@@ -231,7 +231,7 @@ def test_undo_and_redo(editor: Editor) -> None:
     first = editor.settled()
     drag(editor, 150, 0)
     editor.wait_for_change(first)
-    moved = editor.settled()
+    moved = editor.settled_alone()
     editor.page.keyboard.press("Control+z")
     editor.wait("the first view", lambda: not editor.differs(first))
     editor.settled()

@@ -7,14 +7,12 @@ import pytest
 from playwright.sync_api import Page
 
 from service.scene.medium import Medium
-from service.worker.view.under_hand import WORTH
 from tests.web.editing import document
 from tests.web.editor import Editor
 from tests.web.modules import call
 
 SCENE = {"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 2, "material": "m"}]}
 FORM = "#medium-part [data-field={}]"
-GUESSED = WORTH[-1][0]  # samples of a picture until which the one before has a part in it
 
 
 def looks_again(editor: Editor, before: list[float]) -> None:
@@ -23,19 +21,12 @@ def looks_again(editor: Editor, before: list[float]) -> None:
     editor.wait("the picture of before", lambda: not editor.differs(before, 6))
 
 
-def without_guess(editor: Editor) -> list[float]:
-    """The pixels once the picture before the edit has no part in them."""
-    editor.settled()
-    editor.wait("samples of its own", lambda: editor.samples() >= GUESSED)
-    return editor.pixels()
-
-
 def test_a_body_is_filled_and_emptied(editor: Editor) -> None:
     page = editor.page
     before = editor.settled()
     editor.pick("library", "water")
     editor.wait_for_change(before)
-    clear = without_guess(editor)
+    clear = editor.settled_alone()
     editor.tab("scene")
     page.click("#outline-list [data-thing='/shapes/0']")
     page.hover("#thing-title")
@@ -45,7 +36,7 @@ def test_a_body_is_filled_and_emptied(editor: Editor) -> None:
 
     kind.select_option("look")
     editor.wait_for_change(clear)
-    cloudy = without_guess(editor)
+    cloudy = editor.settled_alone()
     found = document(editor)["shapes"][0]["medium"]
     assert set(found) == {"albedo", "radius"} and found["radius"][0] > 0
     shown = page.locator("#medium-part [data-field]").evaluate_all("all => all.map((each) => each.dataset.field)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 from playwright.sync_api import Route, WebSocketRoute
@@ -75,13 +76,23 @@ def test_the_old_scene_is_not_taken_for_the_new_one(blank: Editor, server: Serve
     editor.wait("the choice", lambda: editor.chosen("scenes") == "cornell-boxes")
     title = page.get_attribute("#scenes [aria-selected=true]", "aria-label")
     editor.wait("the words", lambda: page.is_visible("#preparing"))
-    assert page.inner_text("#preparing").startswith(f"Preparing {title}…")
-    dark = "getComputedStyle(document.getElementById('sheet')).filter"
-    assert "brightness" in page.evaluate(dark), "the old picture is dimmed"
+    assert page.inner_text("#preparing").startswith(f"{title}") and editor.text("#state") == "Preparing"
+    editor.wait("for how long", lambda: re.fullmatch(rf"{re.escape(title)}: \d+ s.*", page.inner_text("#preparing")))
+    light = "getComputedStyle(document.getElementById('sheet'))"
+    assert page.evaluate(f"[{light}.filter, {light}.opacity]") == ["none", "1"], "the last picture stays"
     for reading in ("samples", "rate", "noise", "elapsed", "left"):
         assert page.text_content(f"#{reading}") == "–", "the readings were the old picture's"
     late, held = held, None
     for frame in late:
         routes[-1].send(frame)
     editor.wait("the new picture", lambda: page.is_hidden("#preparing") and editor.samples() >= 1)
-    assert page.evaluate(dark) == "none"
+
+    editor.settled()
+    held = []
+    title = page.get_attribute("#library [data-value=gold]", "aria-label")
+    page.locator("#library [data-value=gold]").dispatch_event("click")
+    editor.wait("the words", lambda: page.inner_text("#preparing").startswith(title or "?"))
+    late, held = held, None
+    for frame in late:
+        routes[-1].send(frame)
+    editor.wait("gold", lambda: page.is_hidden("#preparing"))

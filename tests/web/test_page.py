@@ -28,7 +28,8 @@ STATE = """async () => {
 
 
 # How far a picture is, how long that took, and what a render would take by that.
-PROGRESS = re.compile(r'[a-z]+ id="(preparing|preview|samples|noise|left|rate|elapsed|progress)"|span class="price"')
+TOLD = "preparing|preview|samples|noise|left|rate|elapsed|progress|announcer"
+PROGRESS = re.compile(rf'[a-z]+ id="({TOLD})"|span class="price"')
 CHANCE = re.compile(r'blob:[^"]+|(?<=[a-z])-\d+(?=[-" ])|(?<=Clean) in about .*?(?=[.]"|[.]$)')
 WAITED = "sunbox.preparing"  # what a page keeps of it where it was long
 KEPT = """async () => [

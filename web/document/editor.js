@@ -10,6 +10,7 @@ import { exposed } from "./lighting.js";
 import { isFlat } from "./bounds.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { filesFor, modelOfFile } from "./model-files.js";
+import { inWords } from "../lib/format-text.js";
 import { at, pointer, put } from "../lib/patch.js";
 import { blackMaterial, cameraModels, defaults, environmentModels, fields, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
@@ -213,12 +214,12 @@ export class Editor extends Store {
     return carried(chosen.material, this.material, scene);
   }
 
-  // Another material in the place of the one in hand, bare or with its textures. It comes whole or, if the server
-  // refuses any of it, not at all.
-  putMaterial(document) {
+  // Another material in the place of the one in hand, bare or with its textures, which may have a title where it comes
+  // from. It comes whole or, if the server refuses any of it, not at all.
+  putMaterial(document, title = null) {
     const place = this.materialPlace;
     const { material, textures, added, lost } = received(this.state.scene, unpacked(document)[0]);
-    this.#arrival = { place, before: this.material, material, added };
+    this.#arrival = { place, before: this.material, material, added, title };
     const { scene } = this.state;
     this.change(put({ ...this.state, scene: withTextures(scene, textures) }, place, material));
     if (lost.length) this.complain(new Error(missingWords(lost)));
@@ -226,16 +227,17 @@ export class Editor extends Store {
 
   // A thing gets a material, as `dressed` has it.
   dress(thing, what) {
-    this.try(null);
     const { scene, material, arrival, lost } = dressed(this.state, thing, what);
-    this.#arrival = arrival;
+    this.#arrival = arrival && { ...arrival, title: what.title ?? null };
     this.change({ scene, chosen: { ...this.state.chosen, thing, material } });
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
-  // Shows a thing so, for as long as a hand hovers over it; null for no thing.
-  tryOn(thing, what) {
-    this.try(thing && { scene: dressed(this.steady, thing, what).scene });
+  // What a material is called: as it was where it came from, if it came last.
+  titleOfMaterial(name) {
+    const { place, material, title } = this.#arrival ?? {};
+    const isArrival = title && place === pointer("scene", "materials", name) && at(this.state, place) === material;
+    return isArrival ? title : inWords(name);
   }
 
   pickModel(type) {
@@ -357,10 +359,6 @@ export class Editor extends Store {
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
   // says which place the control is for (null: none has it). These places come back. A whole material goes as it came.
   takeBack({ errors }, valid, mark) {
-    if (this.steady !== this.state) {
-      this.try(null);
-      return [null];
-    }
     const arrival = this.#arrival;
     const isArrivals = ({ pointer: wrong }) =>
       [arrival.place, ...arrival.added.map((name) => pointer("scene", "textures", name))].some(

@@ -67,3 +67,6 @@ export function paired(material, name, value, partner) {
   const { [name]: old, [partner.name]: other = partner.example, ...rest } = material;
   return (value ?? null) === null ? rest : { ...rest, [name]: value, [partner.name]: other };
 }
+
+// Whether any thing is made of a material.
+export const isWorn = ({ shapes }, name) => shapes.some(({ material }) => material === name);

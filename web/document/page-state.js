@@ -21,6 +21,7 @@ export class PageState {
   ended = null; // the generation that is done
   painted = 0; // the generation on the canvas
   paintedHome = null; // the scene on the canvas, as it was picked
+  paintedScene = null; // the same, as it was seen last
   header = null; // of the frame on the canvas
   camera = null; // members of the camera that is shown in the place of the scene's, while a turntable turns
   knobs = {}; // what the chosen quality makes of the settings that are not given
@@ -36,7 +37,9 @@ export class PageState {
   paint({ header }) {
     this.header = header;
     this.painted = header.generation;
-    if (!this.isWaiting) this.paintedHome = this.editor.state.home;
+    if (this.isWaiting) return;
+    this.paintedHome = this.editor.state.home;
+    this.paintedScene = this.wanted.scene;
   }
 
   get isDone() {

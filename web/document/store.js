@@ -9,7 +9,6 @@ export class Store {
   #past = [];
   #future = [];
   #gesture = null;
-  #steady = null; // the state before something was tried
 
   constructor(state) {
     this.state = state;
@@ -22,7 +21,6 @@ export class Store {
   // Takes over some members of the state. Changes of one gesture (a drag, a key held down) are
   // undone together: they follow one another with the same name and without `seal` between them.
   change(members, gesture = null) {
-    this.try(null);
     if (gesture === null || gesture !== this.#gesture) {
       this.#past = [...this.#past.slice(1 - DEPTH), this.state];
       this.#future = [];
@@ -34,19 +32,6 @@ export class Store {
   // A change that nobody made by hand (a refused value taken back, a new window size): not undone.
   amend(members) {
     this.#set({ ...this.state, ...members });
-  }
-
-  // The state without what is only tried.
-  get steady() {
-    return this.#steady ?? this.state;
-  }
-
-  // Shows some members for as long as a hand hovers, which is no step to undo; null takes them back.
-  try(members) {
-    if (!members && !this.#steady) return;
-    const { steady } = this;
-    this.#steady = members && steady;
-    this.#set({ ...steady, ...members });
   }
 
   seal() {

@@ -107,23 +107,24 @@ export class Thumbnails {
     return (await this.#index)[kind]?.[name] !== undefined;
   }
 
-  // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped.
-  later(image, get) {
+  // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped. Where it is
+  // not to be `rendered`, one is shown that was rendered before.
+  later(image, get, isRendered = true) {
     if (!image.src) this.plain(image, GREY);
     this.#queue = this.#queue.filter((each) => each.image !== image);
-    this.#queue.push({ image, get });
+    this.#queue.push({ image, get, isRendered });
     this.work();
   }
 
   // The picture of a material of the scene, bare or with its textures: a ball of its colour, when that is new, until the
-  // service has rendered it.
-  async own(image, document) {
+  // service has rendered it. What no thing wears stays so: nothing is prepared for that.
+  async own(image, document, isWorn) {
     const tint = Object.values(unpacked(document)[0].material).find(isColor) ?? GREY;
     if (image.dataset.tint !== String(tint)) {
       image.dataset.tint = String(tint);
       await this.plain(image, tint);
     }
-    this.later(image, async () => document);
+    this.later(image, async () => document, isWorn);
   }
 
   // Call when the picture comes to rest, and when it goes on: what is being rendered then makes room and waits again.
@@ -143,10 +144,11 @@ export class Thumbnails {
     this.work();
   }
 
-  async #make({ image, get }, signal) {
+  async #make({ image, get, isRendered }, signal) {
     const document = await get();
     const name = `thumbnail ${self.crypto.subtle ? await hash(document) : JSON.stringify(document)}`;
     let blob = await recall(name);
+    if (!blob && !isRendered) return;
     if (!blob) {
       this.#scene ??= await studio();
       blob = await renderPicture(staged(this.#scene, document), SETTINGS, signal);

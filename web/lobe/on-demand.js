@@ -15,12 +15,9 @@ export class LobeOnDemand {
     this.#part = new OnDemand(load, ({ LobePanel }) => new LobePanel(root, needs), { complain });
   }
 
-  // Before the panel opens: its code comes, and the kernel of its first plot is compiled.
+  // Before the panel opens its code comes, and nothing is asked of the renderer.
   prepare() {
-    this.#part.get().then(
-      (panel) => panel.prepare(),
-      () => {}, // said when it is opened
-    );
+    this.#part.get().catch(() => {}); // said when it is opened
   }
 
   refresh() {

@@ -13,7 +13,6 @@ import { solid } from "./solid.js";
 import { Table } from "./table.js";
 import { terms } from "./terms.js";
 import { isGrey } from "./values.js";
-import { Warming } from "./warming.js";
 import { askBsdf } from "../server/api.js";
 import { element, freshId } from "../lib/dom.js";
 import { saveAs } from "../lib/files.js";
@@ -45,7 +44,6 @@ export class LobePanel {
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
   #latest = new Latest();
-  #warming = new Warming(askBsdf, (material, type) => this.acts.conversions.to(material, type));
   #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
@@ -286,7 +284,6 @@ export class LobePanel {
     ]);
     if (key === this.#wanted) return this.#draw();
     this.#wanted = key;
-    this.#warming.end();
     this.root.setAttribute("aria-busy", "true");
     this.#await();
     const options = { ...this.#options };
@@ -320,7 +317,6 @@ export class LobePanel {
         });
         if (isBetter && !isStale()) this.#show(view, data);
       }
-      if (!isStale()) this.#warm(materials.a);
     } catch (problem) {
       this.#answered();
       this.root.setAttribute("aria-busy", "false");
@@ -330,24 +326,6 @@ export class LobePanel {
       this.trouble.textContent = problemText(problem, this.titles);
       this.plot.replaceChildren();
     }
-  }
-
-  // Before the panel opens, as a hand comes near its button: the kernel of its first plot is compiled meanwhile.
-  prepare() {
-    if (!this.root.hidden) return;
-    this.#warming.begin([{ material: this.#materials().materials.a, needs: this.#view.needs }], 0);
-  }
-
-  // What may be asked for next: the other views of this material, and this view of other models, but of those that a
-  // file makes.
-  #warm(material) {
-    const isOfFile = (type) =>
-      fields(this.schema, this.models[type]).some(({ widget, required }) => widget === "file" && required);
-    const others = Object.keys(this.models).filter((type) => type !== material.type && !isOfFile(type));
-    this.#warming.begin([
-      ...this.views.map((name) => ({ material, needs: VIEWS[name].needs })),
-      ...others.map((type) => ({ material, type, needs: this.#view.needs })),
-    ]);
   }
 
   #await() {

@@ -1,5 +1,5 @@
-// A material that is carried from the shelf to a thing, in the picture or in the outline. The thing is shown with it
-// while the hand is over it, and as it was when the hand goes on; only letting go is a change.
+// A material that is carried from the shelf to a thing, in the picture or in the outline. The thing is pointed out
+// while the hand is over it; only letting go is a change, for which the renderer may have to prepare something.
 
 import { pointer } from "../lib/patch.js";
 
@@ -8,13 +8,14 @@ const TYPE = "application/x-sunbox-material";
 export class Carrier {
   #what = null; // what is carried from this page: a promise of {name} or {document, wanted}
   #place = null; // where the hand is: {x, y} over the picture, {thing} over the outline, null elsewhere
-  #shown = null; // the thing that is shown with it
+  #shown = null; // the thing that is pointed out
   #isFollowing = false;
 
   // `acts` the editor; `stage` and `outline` elements; `shapeAt(x, y)` resolves to the index of the shape there or null,
-  // which is quick after `prepare()`; `open(parcel)` resolves to what is carried; `say(text)` reads out.
-  constructor({ acts, stage, outline, shapeAt, prepare, open, say }) {
-    Object.assign(this, { acts, stage, outline, shapeAt, prepare, open, say });
+  // which is quick after `prepare()`; `point(index)` points it out, or nothing for null; `open(parcel)` resolves to what is
+  // carried; `say(text)` reads out.
+  constructor({ acts, stage, outline, shapeAt, point, prepare, open, say }) {
+    Object.assign(this, { acts, stage, outline, shapeAt, point, prepare, open, say });
     for (const target of [stage, outline]) {
       target.addEventListener("dragover", (event) => {
         if (!event.dataTransfer.types.includes(TYPE)) return;
@@ -66,25 +67,29 @@ export class Carrier {
     return shape === null ? null : pointer("shapes", shape);
   }
 
-  // Shows what the hand is over, one thing after the other; places that it has left meanwhile are passed over.
+  // Points out what the hand is over, one thing after the other; places that it has left meanwhile are passed over.
   async #follow(place) {
     this.#place = place;
-    if (this.#isFollowing || !this.#what) return; // from another page nothing is known before it is let go
+    if (this.#isFollowing) return;
     this.#isFollowing = true;
     for (let seen; seen !== this.#place; ) {
       seen = this.#place;
-      const thing = await this.#thingAt(seen).catch(() => null);
-      const what = await this.#what?.catch(() => null);
-      if (what && thing !== this.#shown) this.acts.tryOn(thing, what);
-      if (what) this.#shown = thing;
+      this.#pointOut(await this.#thingAt(seen).catch(() => null));
     }
     this.#isFollowing = false;
-    if (!this.#what) this.#end();
+  }
+
+  #pointOut(thing) {
+    if (thing === this.#shown) return;
+    this.#shown = thing;
+    this.point(thing === null ? null : Number(thing.split("/")[2]));
+    for (const row of this.outline.querySelectorAll("[data-thing]"))
+      row.classList.toggle("under-hand", row.dataset.thing === thing);
   }
 
   #end() {
-    this.#what = this.#place = this.#shown = null;
-    this.acts.tryOn(null);
+    this.#what = this.#place = null;
+    this.#pointOut(null);
   }
 
   async #drop(place, what) {

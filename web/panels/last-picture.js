@@ -1,10 +1,10 @@
-// The picture that was last seen of a scene, dimmed and out of focus, until its first frame is there.
+// The picture that was last seen of a scene, until its first frame is there.
 
 import { recall, remember } from "../lib/browser-storage.js";
 
 const NAME = "last picture ";
 const WORK = "work"; // a scene that was changed; a built-in one has its own name
-const LONGEST = 480; // pixels of the longer side, which is enough for what is out of focus
+const LONGEST = 960; // pixels of the longer side: some 50 kB
 const FADE_MS = 300; // until the first frame covers it
 
 // What a picture is of: {name, of}; `builtIn` is the name of a built-in scene as it comes, else null.
@@ -14,9 +14,9 @@ export const subject = ({ scene, hidden = [] }, builtIn) =>
 export class LastPicture {
   #isOver = false;
 
-  // `image` lies under the picture; `label` says what is waited for.
-  constructor(image, label) {
-    Object.assign(this, { image, label });
+  // `image` lies under the picture.
+  constructor(image) {
+    this.image = image;
   }
 
   // Shows what is kept of a subject, if there is something.
@@ -25,9 +25,6 @@ export class LastPicture {
     if (!kept || kept.of !== of || this.#isOver) return;
     this.image.src = URL.createObjectURL(kept.blob);
     this.image.hidden = false;
-    if (!this.label.hidden) return;
-    this.label.textContent = "Preparing…";
-    this.label.hidden = false;
   }
 
   // A frame stands on the canvas.

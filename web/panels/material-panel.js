@@ -10,9 +10,11 @@ import { sentence } from "../lib/format-text.js";
 
 const MOST_NAMED = 2; // things that are named; more are counted
 
-// `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, set)` puts in its picture.
+// `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, set, isWorn)` puts in its
+// picture.
 export class MaterialPanel {
   #painted = []; // what its picture was made of
+  #isWorn = false; // what it was then
 
   constructor(find, { acts, say, paint }) {
     Object.assign(this, { find, acts, say, paint });
@@ -98,8 +100,10 @@ export class MaterialPanel {
     this.find("own-material").hidden = !materials.isShared({ scene }, chosen.thing);
     this.find("delete-material").disabled = Object.keys(scene.materials).length < 2;
     const now = pictured(this.acts.material, scene, this.#painted);
-    if (now === this.#painted) return;
+    const isWorn = materials.isWorn(scene, chosen.material);
+    if (now === this.#painted && isWorn === this.#isWorn) return;
     this.#painted = now;
-    this.paint(this.find("material-picture"), this.acts.materialSet);
+    this.#isWorn = isWorn;
+    this.paint(this.find("material-picture"), this.acts.materialSet, isWorn);
   }
 }

@@ -24,7 +24,7 @@ export class Panel {
 
   // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing), takeTexture(place, file),
   // takeTable(file) and replaceFile({kind, endings});
-  // `paint(image, material)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
+  // `paint(image, material, isWorn)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
   // them.
   constructor(find, { schema, library, acts, stage, paint, say, textureActs }) {
     Object.assign(this, { find, stage, textureActs, acts, schema });

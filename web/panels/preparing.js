@@ -1,24 +1,24 @@
-// While the renderer prepares something else than the canvas shows: the old picture is dimmed, a line over it says
-// what is being prepared, for how long, and how long that may go on; the readings, which are the old picture's, are
-// blank.
+// While the renderer prepares something else than the canvas shows: what that is, for how long it has been prepared, and
+// how long that may go on. The last picture stays as it is; the readings, which are that one's, are blank.
 
 import { Durations } from "../lib/durations.js";
 
-const CHANGE_MS = 1500; // a change that is answered sooner needs no word
+const CHANGE_MS = 500; // a change that is answered sooner needs no word
 const SCENE_MS = 250; // another scene must not be taken for the old one
-const LONG_S = 2; // from which on it is said how long it takes
+const LONG_S = 2; // what takes less is not remembered, and nobody asks for how long
 
 export class Preparing {
   #since = null;
   #timer = 0;
   #took = 0; // milliseconds, the last wait
+  #isSaid = false; // what takes so long was read out
   #kinds = []; // of what is being prepared, the nearest first
   #durations = new Durations("sunbox.preparing");
 
-  // `stage` and `label` are elements; `subject()` gives {name, isOther}: what is wanted, and whether the canvas shows
-  // another scene; `begun()` is called once the words are shown.
-  constructor({ stage, label, subject, begun }) {
-    Object.assign(this, { stage, label, subject, begun });
+  // `label` is an element; `subject()` gives {name, isOther}: what is wanted, and whether the canvas shows another scene;
+  // `begun()` is called once the words are shown, `say(text)` reads out what takes long.
+  constructor({ label, subject, begun, say }) {
+    Object.assign(this, { label, subject, begun, say });
   }
 
   get isShown() {
@@ -50,7 +50,6 @@ export class Preparing {
     this.wait(false);
     this.#took = 0;
     this.label.hidden = true;
-    this.stage.classList.remove("stale");
   }
 
   #look() {
@@ -62,20 +61,20 @@ export class Preparing {
       return;
     }
     this.#kinds = isOther ? [`scene ${name}`, "scene"] : ["change"];
-    const wasShown = this.stage.classList.contains("stale");
-    this.label.textContent = `Preparing ${name}…${this.#time(Math.floor(waited / 1000))}`;
-    if (!wasShown) {
+    this.label.textContent = `${name}${this.#time(Math.floor(waited / 1000))}`;
+    if (!this.isShown) {
       this.label.hidden = false;
-      this.stage.classList.add("stale");
       this.begun();
     }
+    if (waited >= 1000 * LONG_S && !this.#isSaid) this.say(`Preparing ${name}`);
+    this.#isSaid = waited >= 1000 * LONG_S;
     this.#timer = setTimeout(() => this.#look(), 1000 - (waited % 1000));
   }
 
-  // " 5 s, about 8 s left", the latter by what such a thing took before.
+  // ": 5 s, about 8 s left", the latter by what such a thing took before.
   #time(seconds) {
-    if (seconds < LONG_S) return "";
-    const all = this.#durations.expected(this.#kinds, seconds);
-    return ` ${seconds} s${all === null ? "" : `, about ${Math.ceil(all - seconds)} s left`}`;
+    if (seconds < 1) return "";
+    const all = seconds < LONG_S ? null : this.#durations.expected(this.#kinds, seconds);
+    return `: ${seconds} s${all === null ? "" : `, about ${Math.ceil(all - seconds)} s left`}`;
   }
 }

@@ -4,6 +4,7 @@
 import { fetchPreset } from "../server/api.js";
 import { OWN } from "../document/editor.js";
 import { carried, pictured } from "../document/material-set.js";
+import { isWorn } from "../document/materials.js";
 import { Carrier } from "./carrier.js";
 import { PictureList } from "../lib/picture-list.js";
 import { element } from "../lib/dom.js";
@@ -126,9 +127,15 @@ export class Shelf {
     return this.#materials.get(value);
   }
 
+  #titleOf(value) {
+    const saved = this.saved?.entries.find(({ name }) => `${SAVED} ${name}` === value);
+    const { title } = saved ?? this.library.materials.find(({ name }) => name === value) ?? {};
+    return title ? short(title) : null;
+  }
+
   async #assign(value) {
     try {
-      this.acts.putMaterial(await this.#fetch(value));
+      this.acts.putMaterial(await this.#fetch(value), this.#titleOf(value));
       this.used = value;
       this.shown.mark(value);
     } catch (problem) {
@@ -144,7 +151,8 @@ export class Shelf {
   async #open({ page, name, document, library }) {
     if (page === PAGE) return { name };
     if (!library) return { document, wanted: name };
-    return { document: await this.#fetch(library), wanted: library.replace(SAVED_START, "") };
+    const wanted = library.replace(SAVED_START, "");
+    return { document: await this.#fetch(library), wanted, title: this.#titleOf(library) };
   }
 
   #carried(name) {
@@ -160,9 +168,9 @@ export class Shelf {
     for (const [name, document] of documents) {
       const image = this.materials.image(name);
       const now = pictured(document, scene, image.painted);
-      if (now === image.painted) continue;
-      image.painted = now;
-      this.thumbnails.own(image, this.#carried(name));
+      if (now === image.painted && isWorn(scene, name) === image.isWorn) continue;
+      Object.assign(image, { painted: now, isWorn: isWorn(scene, name) });
+      this.thumbnails.own(image, this.#carried(name), image.isWorn);
     }
     this.materials.mark(chosen.material);
     if (this.used && this.#materials.get(this.used) !== scene.materials[chosen.material]) this.used = null;

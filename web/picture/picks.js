@@ -13,6 +13,7 @@ const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebo
 
 export class Picks {
   #outlined = {}; // what the outline was drawn of: it stays while that is so
+  #before = null; // the same, while a hand points at shapes
 
   // `find(id)` elements, `acts` the editor, `stream`, `viewport`; `say(text)`, `complain(error)`.
   constructor({ find, acts, stream, viewport, say, complain }) {
@@ -31,12 +32,12 @@ export class Picks {
   // The index of the shape at a point of the page, or null.
   async shapeAt(x, y) {
     const place = this.viewport.place(x, y);
-    return place && this.picker.shape(this.acts.steady.scene, place);
+    return place && this.picker.shape(this.acts.state.scene, place);
   }
 
   // Has shapeAt() answer at once.
   prepare() {
-    return this.picker.layer("shape_id", this.acts.steady.scene).catch(() => {});
+    return this.picker.layer("shape_id", this.acts.state.scene).catch(() => {});
   }
 
   async select(place) {
@@ -49,6 +50,10 @@ export class Picks {
     if (isOn(this.acts.state, "locked", [pointer("shapes", shape)])) return this.say("It is locked");
     this.acts.select(pointer("shapes", shape));
     this.say(`${inWords(scene.shapes[shape].material)} selected`);
+    await this.#outline(scene, shape);
+  }
+
+  async #outline(scene, shape) {
     drawOutline(
       this.find("outline"),
       await this.picker.layer("shape_id", scene),
@@ -56,9 +61,19 @@ export class Picks {
       getComputedStyle(this.find("stage")).getPropertyValue("--accent-bright"),
     );
     const { camera, shapes } = scene;
-    this.#outlined = { camera, shapes, thing: this.acts.state.chosen.thing };
+    this.#outlined = { camera, shapes, thing: this.acts.state.chosen.thing, shape };
     this.find("outline").classList.add("shown");
     this.mark();
+  }
+
+  // Outlines the shape that a hand is over; for null the one that was outlined before, if any.
+  async point(shape) {
+    const isShown = this.find("outline").classList.contains("shown");
+    if (shape !== null) this.#before ??= isShown ? this.#outlined : {};
+    const outlined = shape ?? this.#before?.shape ?? null;
+    if (shape === null) this.#before = null;
+    if (outlined === null) this.find("outline").classList.remove("shown");
+    else await this.#outline(this.acts.state.scene, outlined);
   }
 
   async focus(place, aspect) {

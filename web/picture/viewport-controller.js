@@ -149,6 +149,11 @@ export class ViewportController {
     return (await this.#picks()).shapeAt(x, y);
   }
 
+  // Outlines the shape that a hand is over, or null.
+  async point(shape) {
+    await (await this.#picks()).point(shape);
+  }
+
   // Has shapeAt() answer at once.
   async prepare() {
     await (await this.#picks()).prepare();
