@@ -157,7 +157,7 @@ export function laterParts({
     touched = target.closest("[data-field]")?.dataset.field ?? touched;
   });
   sweep.nears(find("sweep-material"));
-  find("sweep-material").addEventListener("click", () => sweep.calls("open")(touched));
+  find("sweep-material").addEventListener("click", () => sweep.calls("open")(touched, find("material-more")));
 
   const all = [textures, adder, importer, menus, finals, controller.tools];
   return {

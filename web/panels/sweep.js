@@ -75,8 +75,8 @@ export class Sweep {
     this.titles = fieldTitles(schema.scene, schema.settings);
   }
 
-  // `name` is of the parameter that is swept at first, if it can be.
-  open(name) {
+  // `name` is of the parameter that is swept at first, if it can be; `from` gets the keyboard back.
+  open(name, from) {
     const { material, materialPlace: place, state } = this.acts;
     const own = fields(this.schema, this.models[material.type]);
     const offered = sweepable(own, material);
@@ -124,6 +124,8 @@ export class Sweep {
       removeEventListener("pagehide", leave);
       leave();
       dialog.remove();
+      // The browser gives it to what had it before: nothing, where its code came after the menu was gone.
+      if (document.activeElement === document.body) from.focus();
     });
     document.body.append(dialog);
     sweep();
