@@ -78,7 +78,7 @@ GPU_LAYERS = [
 # Which rooms of `gpu` others may look into; `gpu` stands for the names that gpu/__init__.py lists.
 RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analysis")
 LOOKS_INTO_GPU = {
-    "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables"),
+    "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables", "gpu.jit"),
     "service.worker": RUNS_KERNELS,
     "service.commands": ("gpu", "gpu.errors", "gpu.denoise"),
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),

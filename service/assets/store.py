@@ -122,7 +122,8 @@ class AssetStore:
             what = NO_SCENES[info.kind]
             raise NotFound(f"{id[:100]} {what}: only meshes and scene files can be shown as a scene")
         if info.kind == "mesh":
-            document, remark = plain_scene(id, self.mesh(id))
+            # It stays parsed, however large it is, until the scene is packed.
+            document, remark = plain_scene(id, as_mesh(self.load(id, ahead=True), id))
             said = [] if remark is None else [{"pointer": "", "detail": remark}]
             return Imported(document, [*said, *(info.warnings or ())], lit=False)
         return self.materials(id)
@@ -282,14 +283,14 @@ class AssetStore:
             log.error("could not store an asset", {"id": id, "error": error})
             raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
-    def load(self, ref: str) -> Parsed:
-        """An asset of any kind by its reference. Raises AssetError."""
+    def load(self, ref: str, ahead: bool = False) -> Parsed:
+        """An asset of any kind by its reference; `ahead` as ParsedCache.load has it. Raises AssetError."""
         if not ID.fullmatch(ref):
             raise AssetError(f"{ref[:100]!r} is not the id of an asset, `sha256:` and 64 hexadecimal digits")
         known = self._known(ref)
         try:
             format = known.format if known else _format(self._builtin_bytes(ref))
-            return self._parse(ref, format, lambda: self.opened(ref))
+            return self._parse(ref, format, lambda: self.opened(ref), ahead)
         except NotFound as error:
             raise AssetError(error.detail) from None
 

@@ -90,6 +90,8 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
     from service.storage.stores import storage
 
     store = storage(config).assets
+    if path.suffix.lower() != ".mtlx":
+        _expect_meshes()
     try:
         with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
             model = import_model(path, data, store, files_)
@@ -168,14 +170,24 @@ def asset_folders(roots: Sequence[str]) -> list[Path]:
 
 def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:
     """The scene as arrays."""
-    from service.pack import pack, warm_builder
+    from service.pack import pack
     from service.scene.shape import MeshShape
 
-    if any(isinstance(shape, MeshShape) and shape.asset for shape in source.scene.shapes):
-        # numba loads while a child process parses: both take about as long for a large file.
-        Thread(target=warm_builder).start()
+    if source.store is None and any(isinstance(shape, MeshShape) and shape.asset for shape in source.scene.shapes):
+        _expect_meshes()
     with refusals(source.pointer):
         return pack(source.scene, assets, limits=config)
+
+
+def _expect_meshes() -> None:
+    """Have numba loaded while a child process parses: both take about as long for a large file."""
+
+    def load() -> None:
+        from service.pack import warm_builder
+
+        warm_builder()
+
+    Thread(target=load).start()
 
 
 def _value(text: str) -> Any:

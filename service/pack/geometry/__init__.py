@@ -9,6 +9,7 @@ meshes            meshes in world space, and their triangles as records
 displacement      meshes that a height moves
 subdivision       triangles cut until their edges are short enough
 vertex_normals    smooth normals at the corners, and their codes
+corner_angles     the loop over faces that finds these, as machine code
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
 instances         the choice of shared meshes, and the records of the shapes that show them

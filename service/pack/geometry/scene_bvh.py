@@ -10,6 +10,7 @@ from gpu import SceneTooLarge
 from gpu.layout import Node, ShapeKind
 from service.pack.geometry.parallel import chunks, in_threads
 from service.pack.geometry.records import Bounds
+from service.pack.geometry.vertex_normals import corner_normals
 from service.problems import FieldError, InvalidDocument
 from service.scene.numbers import Vec3
 
@@ -132,7 +133,8 @@ def build_scene_bvh(bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.n
 
 
 def warm_builder() -> None:
-    """Load numba and the builder's compiled code, or compile it: the first mesh waits half a second for it, or
-    several."""
+    """Load numba and the compiled code for trees and normals, or compile it: the first mesh waits half a second for
+    it, or several."""
+    corner_normals(np.zeros((3, 3)), np.zeros((1, 3), np.int32))
     low = np.arange(3.0 * (LINEAR[ShapeKind.TRIANGLE] + 1), dtype=np.float32).reshape(-1, 3)
     build_scene_bvh({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})

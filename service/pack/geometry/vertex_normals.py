@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.pack.geometry.parallel import chunks, in_order, in_threads
+from service.pack.geometry.parallel import chunks, in_threads
 
 
 def encode(normals: np.ndarray) -> np.ndarray:
@@ -53,29 +53,15 @@ def corner_normals(
     faces cancel. Positions of different `groups` (n,) are distinct.
     """
     place = same(vertices) if groups is None else same(vertices, groups[:, None])
-    sums = np.zeros((3, int(place.max(initial=-1)) + 1))
-    joined = np.empty((len(faces), 3), np.int32)
+    sums = np.zeros((int(place.max(initial=-1)) + 1, 3))
+    joined = np.ascontiguousarray(place.take(faces))  # raises IndexError, which the loop does not
+    from service.pack.geometry.corner_angles import add_faces  # numba is loaded for meshes alone
 
-    def weighted(some: slice) -> list[np.ndarray]:
-        """Each face's unit normal times its angle at each of its corners."""
-        joined[some] = place.take(faces[some])
-        corners = [vertices.take(faces[some, k], axis=0) for k in range(3)]
-        edges = [corners[(k + 1) % 3] - corners[k] for k in range(3)]  # edge k leads from corner k to the next
-        cross = np.cross(edges[0], edges[1])
-        twice_area = np.linalg.norm(cross, axis=1)
-        unit = np.divide(cross, twice_area[:, None], out=np.zeros_like(cross), where=twice_area[:, None] > 0)
-        angles = (np.arctan2(twice_area, -np.einsum("ij,ij->i", edges[k], edges[k - 1])) for k in range(3))
-        return [angle[:, None] * unit for angle in angles]
-
-    def add(some: slice, rows: list[np.ndarray]) -> None:
-        for k in range(3):
-            add_up(sums, joined[some, k], rows[k])
-
-    in_order(weighted, add, chunks(len(faces)))
-    length = np.sqrt(np.einsum("ij,ij->j", sums, sums))
+    add_faces(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int32), joined, sums)
+    length = np.sqrt(np.einsum("ij,ij->i", sums, sums))
     cancelled = length < 1e-9  # where faces are back to back, only rounding is left
-    sums /= np.where(cancelled, np.inf, length)
-    return np.ascontiguousarray(sums.T), joined  # contiguous: else taking some rows would copy all of them first
+    sums /= np.where(cancelled, np.inf, length)[:, None]
+    return sums, joined
 
 
 def split(faces: np.ndarray, groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

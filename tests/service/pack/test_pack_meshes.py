@@ -70,23 +70,26 @@ def test_computed_normals_join_repeated_vertices_by_angle():
     np.testing.assert_allclose(normals[faces], (2 * corners - 1) / np.sqrt(3), atol=1e-12)
 
 
-def test_computed_normals_add_up_in_the_faces_order(monkeypatch):
-    """Pieces are worked out in threads; vertices of one place are looked for only where there are some."""
+def test_computed_normals_are_weighted_by_angles():
+    """Vertices of one place are looked for only where there are some."""
     rng = np.random.default_rng(1)
     points = rng.normal(size=(1000, 3))
     faces = rng.integers(0, len(points), (9 * CHUNK + 3, 3))
-    threaded, joined = corner_normals(points, faces)
+    normals, joined = corner_normals(points, faces)
     np.testing.assert_array_equal(joined, faces)
-
-    def one_by_one(make, take, jobs):
-        for job in jobs:
-            take(job, make(job))
-
-    monkeypatch.setattr("service.pack.geometry.vertex_normals.in_order", one_by_one)
-    np.testing.assert_array_equal(threaded, corner_normals(points, faces)[0])
+    expected = np.zeros_like(points)
+    for k in range(3):
+        a, b, c = (points[faces[:, (k + j) % 3]] for j in range(3))
+        cross = np.cross(b - a, c - a)
+        size = np.linalg.norm(cross, axis=1)
+        angle = np.arctan2(size, ((b - a) * (c - a)).sum(axis=1))
+        np.add.at(
+            expected, faces[:, k], cross * np.divide(angle, size, out=np.zeros_like(size), where=size > 0)[:, None]
+        )
+    np.testing.assert_allclose(normals, expected / np.linalg.norm(expected, axis=1, keepdims=True), atol=1e-9)
     twice, again = corner_normals(np.tile(points, (2, 1)), faces + 1000 * (np.arange(len(faces))[:, None] % 2))
     assert len(twice) == len(points)
-    np.testing.assert_array_equal(twice[again], threaded[joined])
+    np.testing.assert_allclose(twice[again], normals[joined], atol=1e-12)
 
 
 def test_flat_and_missing_normals():
