@@ -52,8 +52,8 @@ _BUMPS = _TEXTURES | _flags("NORMAL_MAPS HEIGHTS COAT_NORMALS")
 _MICROFACETS = frozenset(name for name in FLAGS if name.startswith("HAS_MICROFACET"))
 _MEDIA = _flags("MEDIA SCATTERING GLOWING_MEDIA STRAIGHT LIGHT_TREE")
 # A scene is of the first of these that has all of its flags. What several have together costs LLVM more than the sum
-# of what each adds: a film with lamps, or layers in a tree of every kind of shape, over a minute. Scenes of such
-# things keep kernels with their own flags, of 5 to 10 s. `PRIORITIES` is nowhere: it says what a scene means.
+# of what each adds: layers in a tree of every kind of shape over a minute. Scenes of such things keep kernels with
+# their own flags, of 5 to 10 s. `PRIORITIES` is nowhere: it says what a scene means.
 FAMILIES: dict[str, frozenset[str]] = {
     "matte": _BASE,
     "odd": _BASE | _ODD,

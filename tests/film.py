@@ -1,4 +1,4 @@
-"""A thin film by transfer matrices and colorimetry's tables: what `shaders/bsdf/lobes/base/film.glsl` stands for."""
+"""A thin film by transfer matrices and colorimetry's tables: what `gpu/tables/film.py` stands for."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gpu import Renderer, layout
-from gpu.device.scene import upload_tables
+from gpu.device.tables import Tables
 from gpu.device.textures import linear_texture
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
@@ -61,6 +61,8 @@ def rare(record: np.ndarray) -> frozenset[str]:
     """The flags that a material raises for code which kernels have only where a scene needs it."""
     members = {"HAS_CONDUCTOR": "conductor_eta", "HAS_THIN_WALLS": "thin_walled", "HAS_FILM": "film_thickness"}
     raised = frozenset(flag for flag, member in members.items() if (record[member] > 0).any())
+    if "HAS_FILM" in raised and (record["metallic"] > 0).any():
+        raised |= {"HAS_METAL_FILM"}
     return raised if EXACT else raised | {"HAS_CONDUCTOR", "HAS_THIN_WALLS"}  # that more in one kernel
 
 
@@ -72,8 +74,8 @@ class Prober:
         self._kernels = KernelCache(self.context, (PROBES, SHADERS))
 
     @cached_property
-    def _tables(self) -> dict[int, Any]:
-        return upload_tables(self.context)
+    def _tables(self) -> Tables:
+        return Tables(self.context)
 
     def run(
         self,
@@ -108,9 +110,8 @@ class Prober:
         for name, value in {**uniforms, "count": count}.items():
             if name in kernel:  # else nothing depends on it
                 kernel[name].value = value
-        if features.needs_tables(raised):
-            for unit, texture in self._tables.items():
-                texture.use(unit)
+        for unit, texture in self._tables.textures(raised).items():
+            texture.use(unit)
         given = {bindings.MICROFACETS_TEXTURE: microfacets, bindings.MEASURED_TEXTURE: measured}
         lab = {u: linear_texture(self.context, words, 4, "u4") for u, words in given.items() if words is not None}
         for unit, texture in lab.items():

@@ -18,7 +18,7 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.bsdf import kernels as own
 from gpu.bsdf import lobes as single
-from gpu.device.scene import upload_tables
+from gpu.device.tables import Tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
@@ -72,11 +72,11 @@ class BsdfTerms:
 
 
 class BsdfEvaluator:
-    """Made by `Renderer.bsdf`. The tables of `principled` are uploaded when they are first needed, and stay."""
+    """Made by `Renderer.bsdf`. Tables are uploaded when they are first needed, and stay."""
 
     def __init__(self, context: Any, kernels: KernelCache) -> None:
         self._context, self._kernels = context, kernels
-        self._tables: dict[int, Any] = {}
+        self._tables = Tables(context)
 
     def values(
         self,
@@ -178,17 +178,14 @@ class BsdfEvaluator:
         return BsdfTerms(facets[:, 3], rest[:, 0], facets[:, :3], rest[:, 1] > 0)
 
     def release(self) -> None:
-        for table in self._tables.values():
-            table.release()
+        self._tables.release()
 
     def _dispatch(self, material: SceneArrays, entry: str, uniforms: dict[str, int]) -> _Dispatch:
         contexts.use(self._context)
         bare = own.bare(material)
         flags = features.evaluating(bare)
-        if features.needs_tables(flags) and not self._tables:
-            self._tables = upload_tables(self._context)
         kernel = self._kernels.get(entry, own.defines(bare, flags, entry))
-        work = _Dispatch(self._context, self._kernels, kernel, self._tables, uniforms)
+        work = _Dispatch(self._context, self._kernels, kernel, self._tables.textures(flags), uniforms)
         try:
             work.upload(bare, flags)
         except BaseException:

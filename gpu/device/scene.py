@@ -13,7 +13,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import EnvironmentArrays, SceneArrays
-from gpu.device import buffers, lamps
+from gpu.device import buffers, lamps, tables
 from gpu.device.textures import IMAGE_UNITS, KINDS, bound_textures, linear_texture, placeholder
 from gpu.device.uploads import Buffer, SharedUploads, Taken, Textures, UploadCache
 from gpu.errors import GpuError
@@ -22,7 +22,6 @@ from gpu.kernels import features
 from gpu.layout import LightKind, bindings
 from gpu.layout.bindings import Slot
 from gpu.settings import RenderSettings
-from gpu.tables import energy
 
 log = logging.getLogger(__name__)
 
@@ -33,27 +32,6 @@ RADIANCE_MAX = 1e20  # most of a texel times the environment's scale
 # a lamp or a sun. By their light alone a lamp in clear glass is picked one time in 25: it shows as white dots. In
 # other scenes the chances are those of the light, which is less noise where both sides are about as bright.
 GLINT_CHANCE = 1 / 3
-
-
-def upload_tables(context: Any) -> Textures:
-    """The tables of `energy` as textures, by unit, linear and clamped: their first axes are folded into the third.
-
-    The index of refraction of stretched lobes is folded into the second: a driver need support only 2 048 layers.
-    """
-    out = Textures()
-    for name, unit in bindings.ENERGY_TEXTURES.items():
-        table = getattr(energy.tables(), name)
-        if name == "stretched":
-            etas, aspects, steps, azimuths, cosines, _ = table.shape
-            table = np.moveaxis(table, 0, 2).reshape(aspects * steps, etas * azimuths, cosines, -1)
-        channels = 1 if name == "sheen" else table.shape[-1]
-        height, width = table.shape[-3:-1] if channels > 1 else table.shape[-2:]
-        size = (width, height, table.size // (width * height * channels))
-        texture = context.texture3d(size, channels, np.ascontiguousarray(table), dtype="f4")
-        texture.filter = (context.LINEAR, context.LINEAR)
-        texture.repeat_x = texture.repeat_y = texture.repeat_z = False
-        out[unit] = texture
-    return out
 
 
 class _Environment(NamedTuple):
@@ -106,7 +84,7 @@ class Scene:
         self._images: Taken[Textures] | None = None
         self._measured: Taken[Textures] | None = None
         self._lit: Taken[_Environment] | None = None
-        self._tables: Taken[Textures] | None = None
+        self._tables: dict[str, Taken[Textures]] = {}
         self.bytes = unshared_bytes(arrays)  # on the device, without what other scenes have, too
         self.uploaded = 0  # bytes that edits which move shapes have uploaded
         try:
@@ -152,8 +130,9 @@ class Scene:
         )
 
     def _take_tables(self) -> None:
-        if features.needs_tables(self._raised) and self._tables is None:
-            self._tables = self._shared.tables.take("energy", partial(upload_tables, self._context))
+        for name in tables.needed(self._raised):
+            if name not in self._tables:
+                self._tables[name] = self._shared.tables.take(name, partial(tables.upload, self._context, name))
 
     def _flags(self) -> frozenset[str]:
         """The flags of its kernels, by its arrays and by the flags that it had before."""
@@ -222,9 +201,9 @@ class Scene:
         pictures. Raises SceneTooLarge, OutOfMemory, and then changes nothing.
         """
         contexts.use(self._context)
-        old, tables, lit = self.arrays, None, None
+        old, lab, lit = self.arrays, None, None
         if arrays.microfacets is not old.microfacets and not np.array_equal(arrays.microfacets, old.microfacets):
-            tables = linear_texture(self._context, arrays.microfacets, *KINDS[bindings.MICROFACETS_TEXTURE])
+            lab = linear_texture(self._context, arrays.microfacets, *KINDS[bindings.MICROFACETS_TEXTURE])
         was, is_ = old.environment, arrays.environment
         if was is not None and is_ is not None and not is_.has_map_of(was):
             lit = self._take_environment(is_)
@@ -235,10 +214,10 @@ class Scene:
                 lit.release()
             raise
         self.arrays = arrays
-        if tables is not None:
+        if lab is not None:
             if bindings.MICROFACETS_TEXTURE in self._details:  # false where this edit adds the first such material
                 self._details[bindings.MICROFACETS_TEXTURE].release()
-            self._details[bindings.MICROFACETS_TEXTURE] = tables
+            self._details[bindings.MICROFACETS_TEXTURE] = lab
         if lit is not None:
             assert self._lit is not None
             self._lit.release()
@@ -260,7 +239,8 @@ class Scene:
                 buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
         self._environment.cells.bind_to_storage_buffer(int(Slot.ENVIRONMENT_CELLS))
         self._environment.texels.use(bindings.ENVIRONMENT_TEXTURE)
-        shared = [taken.upload for taken in (self._tables, self._images, self._measured) if taken is not None]
+        taken = (*self._tables.values(), self._images, self._measured)
+        shared = [each.upload for each in taken if each is not None]
         for unit, texture in chain(*(textures.items() for textures in (*shared, self._details))):
             texture.use(unit)
 
@@ -305,6 +285,6 @@ class Scene:
             buffer.release()
         for texture in self._details.values():
             texture.release()
-        for taken in (self._tables, self._images, self._measured, self._lit):
+        for taken in (*self._tables.values(), self._images, self._measured, self._lit):
             if taken is not None:
                 taken.release()

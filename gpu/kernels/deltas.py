@@ -62,7 +62,7 @@ def goes_straight(materials: np.ndarray) -> np.ndarray:
 
 
 def filmed(materials: np.ndarray) -> np.ndarray:
-    """Materials under a thin film."""
+    """Materials under a thin film, whatever it lies on."""
     m = materials
     out: np.ndarray = of(m, with_optional("film_thickness")) & (m["film_thickness"] > 0) & (m["film_weight"] > 0)
     return out

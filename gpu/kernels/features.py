@@ -18,6 +18,7 @@ from gpu.layout.pixel_layers import SPLAT_BYTES
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
+FILMS = ("HAS_FILM", "HAS_METAL_FILM")
 
 
 def everything() -> frozenset[str]:
@@ -169,9 +170,9 @@ def _quad_lamp(scene: SceneArrays) -> int:
 
 def _shades_once(raised: frozenset[str]) -> bool:
     """Whether a kernel has the BSDF's code once, for lamps and for the path's own direction. Where that is long, LLVM
-    takes a sixth less time then (12 s instead of 32 with a film, 11 instead of 28 with ten models), and samples take
+    takes a sixth less time then (11 s instead of 28 with ten models), and samples take
     no longer, but where paths walk below surfaces. A box of matt walls would gain nothing, and lose 15 %."""
-    is_longest = "HAS_FILM" in raised or len([m for m in FLAGGED if m.lobes_flag in raised]) > 3
+    is_longest = not raised.isdisjoint(FILMS) or len([m for m in FLAGGED if m.lobes_flag in raised]) > 3
     return is_longest or (needs_tables(raised) and "HAS_WALKS" not in raised)
 
 
@@ -186,6 +187,7 @@ def defines(
     out["ANY_EQUIANGULAR"] = int(draws_towards_lamps(raised))
     out["ANY_CHAINS"] = int(not raised.isdisjoint(("HAS_BVH", "HAS_MIRRORS", "HAS_PRIORITIES", "HAS_WALKS")))
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
+    out["ANY_FILM"] = int(not raised.isdisjoint(FILMS))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
     out["ANY_VEILS"] = int(not raised.isdisjoint(("HAS_OPACITY", "HAS_STRAIGHT", "HAS_PRIORITIES")))
     ordered = raised.issuperset(("HAS_STRAIGHT", "HAS_ATTENUATION")) or "HAS_PRIORITIES" in raised

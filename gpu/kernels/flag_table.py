@@ -331,9 +331,16 @@ _ROWS = (
         previewed=_any_of(with_optional("conductor_eta")),
         in_general=False,
     ),
+    # Films on what is no metal, and films on metals, have code of their own, which is long.
     Flag(
         "HAS_FILM",
-        lambda s: bool(filmed(s.materials).any()),
+        lambda s: bool((filmed(s.materials) & (s.materials["metallic"] < 1)).any()),
+        alone_with=_flags_of(with_optional("film_thickness")),
+        in_general=False,
+    ),
+    Flag(
+        "HAS_METAL_FILM",
+        lambda s: bool((filmed(s.materials) & (s.materials["metallic"] > 0)).any()),
         alone_with=_flags_of(with_optional("film_thickness")),
         in_general=False,
     ),

@@ -11,7 +11,7 @@ from gpu.layout.bindings import BlockSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.pixel_layers import COVER_RANKS
 from gpu.layout.record import Record
-from gpu.tables import energy
+from gpu.tables import energy, film
 
 
 def _struct(record: type[Record]) -> str:
@@ -144,7 +144,21 @@ def constants() -> str:
     out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]
     for name in ("LEAST_ASPECT", "LARGEST_ETA", "AZIMUTH_POWER", "LEAST_SHEEN_ROUGHNESS"):
         out.append(f"const float ENERGY_{name} = {getattr(energy, name)!r};")
+    out += [*_film(), f"#define FILM_TEXTURE {bindings.FILM_TEXTURE}"]
     return "\n".join(out)
+
+
+def _film() -> list[str]:
+    """The constants of `gpu.tables.film`."""
+    waves = {
+        "DECAY": -film.EXPONENTS.real, "TURN": film.EXPONENTS.imag,
+        "REAL": film.AMPLITUDES.real, "IMAGINARY": film.AMPLITUDES.imag,
+    }  # fmt: skip
+    out = []
+    for name, rows in waves.items():
+        vectors = ", ".join(f"vec3({', '.join(map(repr, row))})" for row in rows.tolist())
+        out.append(f"const vec3 FILM_{name}[] = vec3[]({vectors});")
+    return [*out, f"const int FILM_WAVES = {len(film.AMPLITUDES)};", f"const float FILM_FADING = {film.FADING!r};"]
 
 
 def text() -> str:

@@ -77,4 +77,5 @@ ENERGY_TEXTURES = {
     "fuzz": 7,
     "facets": 16,  # OpenGL promises 16 units; drivers have 32
 }  # of gpu.tables.energy
+FILM_TEXTURE = 18  # of gpu.tables.film
 TEXELS_A_ROW = 8192  # width of the textures that hold one long row of values, cut into rows

@@ -9,10 +9,9 @@ from uuid import uuid4
 import numpy as np
 
 from gpu import context as contexts
-from gpu.device.scene import upload_tables
+from gpu.device.tables import Tables
 from gpu.device.textures import BYTES
 from gpu.errors import CompileError
-from gpu.kernels import features
 from gpu.kernels.binaries import ENTRIES, ProgramBinaries
 from gpu.layout import bindings
 from gpu.picture import accumulators
@@ -30,7 +29,7 @@ class Precompiler:
     def __init__(self, device: int | None = None) -> None:
         self._context = contexts.create(device)
         self._zeros = self._context.buffer(bytes(_BUFFER))
-        self._tables: dict[int, Any] = {}
+        self._tables = Tables(self._context)
         self._binaries = ProgramBinaries(self._context)
         self._has_cache: bool | None = None  # whether the driver has a disk cache; None: not known yet
 
@@ -72,9 +71,8 @@ class Precompiler:
         """Compile to machine code by running over no pixel. Returns the processor time that it took (s)."""
         text = wanted.text
         textures = [self._texture(*kind) for kind in wanted.textures]
-        if features.needs_tables({name for name, value in wanted.defines if value}):
-            for unit, table in self._energy().items():
-                table.use(unit)
+        for unit, table in self._tables.textures({name for name, value in wanted.defines if value}).items():
+            table.use(unit)
         start = time.process_time()
         try:
             kernel = self._context.compute_shader(text)
@@ -98,7 +96,3 @@ class Precompiler:
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
         texture.use(unit)
         return texture
-
-    def _energy(self) -> dict[int, Any]:
-        self._tables = self._tables or upload_tables(self._context)
-        return self._tables

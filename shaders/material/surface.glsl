@@ -44,17 +44,15 @@ struct Surface {
     vec3 diffuse_through;       // its colour
 #endif
 #endif
-#if ANY_NEEDS_TABLES && HAS_FILM
+#if ANY_NEEDS_TABLES && ANY_FILM
     float film;            // how much of the boundary's reflectance is the film's, 0 where there is none
     float film_thickness;  // um
     float film_ior;
-    float film_outer;      // index of what lies on the film, where a vacuum's is 1,
-    float film_base;       // and of what lies under it
+    float film_outer;      // index of what lies on the film, where a vacuum's is 1
+#if HAS_FILM
+    float film_base;       // index of the dielectric under it
     float film_bends;      // the index of the inside relative to that of the outside by which light is refracted
-    vec3 film_eta;         // of the metal under it,
-    vec3 film_k;           // whose index is film_eta + i film_k
-    vec3 film_mean;        // cosine-weighted mean of the dielectric's reflectance, from outside,
-    vec3 film_metal_mean;  // and of the metal's
+    vec3 film_mean;        // cosine-weighted mean of the dielectric's reflectance, from outside
     vec3 film_once;        // the share of light from wo that its facets reflect once
     vec3 film_kept;        // the share of light from wo that the boundary keeps from what is under it
     vec3 film_kept_mean;   // its cosine-weighted mean
@@ -62,6 +60,12 @@ struct Surface {
     vec3 film_lost_outside; // and its means, seen from outside
     vec3 film_lost_inside; // and from inside
     float film_cosine;     // of wo
+#endif
+#if HAS_METAL_FILM
+    vec3 film_eta;         // of the metal under it,
+    vec3 film_k;           // whose index is film_eta + i film_k
+    vec3 film_metal_mean;  // cosine-weighted mean of its reflectance
+#endif
 #endif
 #if HAS_COAT_NORMALS
     Basis coat; // the coat's own frame, in the shading frame

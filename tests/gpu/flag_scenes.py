@@ -148,6 +148,7 @@ SCENES: dict[str, Doc] = {
     "MEASURED_ADAPTIVE": made_of({"type": "measured", "asset": "rgl"}),
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
     "FILM": made_of({"type": "principled", "film_thickness": 300}),
+    "METAL_FILM": made_of({"type": "principled", "film_thickness": 300, "metallic": 1}),
     "CONDUCTOR": made_of({"type": "principled", "metallic": 1, "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "CAUSTICS": made_of({**GLASS, "roughness": 0}, lights=[LAMP_OF_NO_EXTENT]),

@@ -359,7 +359,7 @@ def test_terms_of_principled(gpu: Renderer) -> None:
 
 
 def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
-    """But a film's: its code takes LLVM ten times as long as all other code, and is compiled when it is asked for."""
+    """But a film's, which is rare: its code is compiled when it is asked for."""
     foreseen = list(kernel_keys.bsdf_keys())
     used = set()
     lab = pack_material(MicrofacetMaterial(type="microfacet"))

@@ -21,7 +21,10 @@ from tests.marks import seldom
 
 PROGRAM = shutil.which("glslangValidator")
 ENTRIES = ("pathtrace.comp", "lighttrace.comp", "guides.comp", "cover.comp")
-OFTEN = {"TRIANGLES", "FILM", "DISPERSION", "MEDIA", "LIGHT_TREE", "HEIGHTS", "OPENPBR_LOBES", "MEASURED_ADAPTIVE"}
+OFTEN = {
+    "TRIANGLES", "FILM", "METAL_FILM", "DISPERSION", "MEDIA", "LIGHT_TREE", "HEIGHTS", "OPENPBR_LOBES",
+    "MEASURED_ADAPTIVE",
+}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(
     PROGRAM is None and not os.environ.get("CI"), reason="glslangValidator is not installed (Debian: glslang-tools)"

@@ -82,7 +82,7 @@ void openpbr_surface(Material m, vec2 tangent, inout Surface s) {
     s.index_matched = s.eta_outside < 1.0001;
     if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
-#if HAS_FILM
+#if ANY_FILM
     openpbr_film(m, s);
 #endif
     s.is_delta = roughness < LEAST_ROUGHNESS;

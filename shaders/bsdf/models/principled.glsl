@@ -37,8 +37,10 @@ void principled_surface(Material m, vec2 tangent, inout Surface s) {
     s.diffuse_transmission = s.is_thin ? m.diffuse_transmission : 0.0;
     s.diffuse_through = m.diffuse_transmission_color.x >= 0.0 ? m.diffuse_transmission_color : m.base_color;
 #endif
-#if HAS_FILM
+#if ANY_FILM
     film_surface(m, s);
+#endif
+#if HAS_METAL_FILM
     if (s.film > 0.0) film_metal_index(s.base_color, vec3(1.0), 1.0, s);
 #if HAS_CONDUCTOR
     if (m.conductor_eta.x > 0.0) {

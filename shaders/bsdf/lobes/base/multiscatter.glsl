@@ -15,7 +15,7 @@ BASE_SHARE base_dielectric_mean(Surface s) {
 }
 
 vec3 base_metal_mean(Surface s) {
-#if HAS_FILM
+#if HAS_METAL_FILM
     if (s.film > 0.0) return s.film_metal_mean;
 #endif
     return models_metal_mean(s);

@@ -103,8 +103,6 @@ void shares_face_film(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
         else ripples += mean.gain;
     }
     s.film_mean = vec3(mix(fresnel_mean(s.eta_outside), 1.0, s.excess)) + fresnel.gain;
-    s.film_metal_mean = vec3(0.0);
-    for (int i = 0; i < 4; i++) s.film_metal_mean += FRESNEL_WEIGHTS[i] * base_metal(s, FRESNEL_COSINES[i]);
     s.film_once = clamp(albedo.y + albedo.x * once.gain, 0.0, albedo.x);
     vec3 clear = shares_clear(s);
     s.film_kept = clamp(multiscatter_albedo(albedo, clear) + (s.film_once - albedo.y), 0.0, 1.0);
@@ -195,6 +193,11 @@ void shares_face(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
 #if HAS_FILM
     s.film_cosine = wo.z;
     if (s.film > 0.0) shares_face_film(wo, albedo, albedo_mean, s);
+#endif
+#if HAS_METAL_FILM
+    s.film_metal_mean = vec3(0.0);
+    for (int i = 0; i < (s.film > 0.0 ? 4 : 0); i++)
+        s.film_metal_mean += FRESNEL_WEIGHTS[i] * base_metal(s, FRESNEL_COSINES[i]);
 #endif
 }
 #endif

@@ -20,7 +20,7 @@ BASE_SHARE base_dielectric(Surface s, float c, float eta) {
 // The metal's reflectance at cosine c.
 vec3 base_metal(Surface s, float c) {
     vec3 f = models_metal(s, c);
-#if HAS_FILM
+#if HAS_METAL_FILM
     if (s.film > 0.0) f = mix(f, film_metal(s, c), s.film);
 #endif
     return f;
