@@ -59,7 +59,9 @@ struct Surface {
     vec3 film_lost;        // the share of light from wo that is lost between the facets of glass,
     vec3 film_lost_outside; // and its means, seen from outside
     vec3 film_lost_inside; // and from inside
-    float film_cosine;     // of wo
+    vec3 film_reflected;   // what a facet that wo hits as it does the surface reflects,
+    vec3 film_passed;      // what it passes,
+    float film_chance;     // and the chance of the former
 #endif
 #if HAS_METAL_FILM
     vec3 film_eta;         // of the metal under it,

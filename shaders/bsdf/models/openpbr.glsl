@@ -244,11 +244,12 @@ OpenpbrWeights openpbr_weights(Surface s, vec3 wo) {
 Scatter openpbr_eval(Surface s, vec3 wo, vec3 wi) {
     OpenpbrWeights w = openpbr_weights(s, wo);
     vec4 albedo_i = base_albedo(s, wi);
+    Scatter facets = base_scatter(s, bsdf_turn(s, wo), bsdf_turn(s, wi));
     BASE_SHARE lost_i = BASE_SHARE(0.0);
 #if HAS_TRANSMISSION
     lost_i = base_lost(s, wi, albedo_i);
     if (wi.z < 0.0) {
-        Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, w.base);
+        Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, facets, w.base);
 #if HAS_THIN_WALLS
         vec3 through = openpbr_through_eval(s, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
         below.f += LOBE(LOBE_DIFFUSE, through);
@@ -259,7 +260,7 @@ Scatter openpbr_eval(Surface s, vec3 wo, vec3 wi) {
 #endif
     vec3 wm = normalize(wo + wi);
     vec3 diffuse = openpbr_diffuse_eval(s, wo, wi, shares_kept(s), shares_kept(s, wi, albedo_i), shares_kept_mean(s));
-    Scatter r = base_eval(s, wo, wi, wm, albedo_i, lost_i, diffuse, w.base);
+    Scatter r = base_eval(s, wi, albedo_i, lost_i, diffuse, facets, w.base);
     r.f *= openpbr_layers(s, wo, wi);
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS
     if (!s.bare) {
@@ -338,7 +339,7 @@ float openpbr_delta_chance(Surface s, vec3 wo) {
     OpenpbrWeights w = openpbr_weights(s, wo);
     float p = 0.0;
 #if HAS_TRANSMISSION
-    if (s.index_matched) p = w.base.specular * (1.0 - base_reflect_chance(s, wo.z));
+    if (s.index_matched) p = w.base.specular * (1.0 - base_level(s, wo).chance);
 #endif
     if (s.is_delta) p = w.base.specular;
 #if HAS_CLEARCOAT

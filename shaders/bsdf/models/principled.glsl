@@ -224,11 +224,12 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
 Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     PrincipledWeights w = principled_weights(s, wo);
     vec4 albedo_i = base_albedo(s, wi);
+    Scatter facets = base_scatter(s, bsdf_turn(s, wo), bsdf_turn(s, wi));
     BASE_SHARE lost_i = BASE_SHARE(0.0);
 #if HAS_TRANSMISSION
     lost_i = base_lost(s, wi, albedo_i);
     if (wi.z < 0.0) {
-        Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, w.base);
+        Scatter below = base_eval_below(s, wo, wi, albedo_i, lost_i, facets, w.base);
         bool leaves = s.inside; // into the air, through the layers there
 #if HAS_THIN_WALLS
         leaves = leaves || s.is_thin;
@@ -247,7 +248,7 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_THIN_WALLS
     diffuse *= 1.0 - s.diffuse_transmission;
 #endif
-    Scatter r = base_eval(s, wo, wi, wm, albedo_i, lost_i, diffuse, w.base);
+    Scatter r = base_eval(s, wi, albedo_i, lost_i, diffuse, facets, w.base);
     if (!s.inside) {
         float coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
         float sheen_i = principled_sheen_albedo(s, wi.z);
@@ -325,7 +326,7 @@ LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 float principled_delta_chance(Surface s, vec3 wo) {
     PrincipledWeights w = principled_weights(s, wo);
     float p = 0.0;
-    float chance = base_reflect_chance(s, wo.z);
+    float chance = base_level(s, wo).chance;
 #if HAS_TRANSMISSION
     if (s.index_matched) p = w.base.specular * (1.0 - chance);
 #endif

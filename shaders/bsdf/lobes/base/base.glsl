@@ -41,7 +41,15 @@ void base_side(bool behind, inout Surface s) {
 }
 
 // Sets what depends on wo.
-void base_face(vec3 wo, inout Surface s) { shares_face(wo, base_albedo(s, wo), base_albedo_mean(s), s); }
+void base_face(vec3 wo, inout Surface s) {
+    shares_face(wo, base_albedo(s, wo), base_albedo_mean(s), s);
+#if HAS_FILM
+    BaseFacet level = base_meets(s, wo.z);
+    s.film_reflected = level.reflected;
+    s.film_passed = level.passed;
+    s.film_chance = level.chance;
+#endif
+}
 
 // The share that comes back of the light that single scattering loses between microfacets of the mixed base.
 vec3 base_multiscatter(Surface s) {
@@ -62,13 +70,10 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
     BaseWeights w;
     w.diffuse = diffuse + (1.0 - s.albedo.x) * luminance(base_multiscatter(s));
     w.diffuse_below = 0.0;
-    float specular = luminance(base_fresnel(s, wo.z));
+    BaseFacet level = base_level(s, wo);
+    float specular = luminance(level.reflected);
 #if HAS_TRANSMISSION
-#if HAS_THIN_WALLS
-    if (s.is_thin) specular += luminance(pane_transmittance(s, pane_reflected(s, wo.z)));
-    else
-#endif
-    specular += luminance(base_transmittance(s, wo.z));
+    specular += luminance(base_through(s, level.passed));
     if (multiscatter_glass(s)) {
         float glass = (1.0 - s.metallic) * s.transmission;
         float t = base_grey(multiscatter_transmit_chance(s)), lost = glass * base_grey(shares_lost(s));
@@ -93,42 +98,32 @@ BaseWeights base_weights(Surface s, vec3 wo, float diffuse) {
 // What wi loses between the facets, on the side where it is.
 BASE_SHARE base_lost(Surface s, vec3 wi, vec4 albedo_i) { return shares_lost(s, wi, albedo_i, s.inside != (wi.z < 0.0)); }
 
-// Of light that passes the base: f lacks the layers.
-Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BASE_SHARE lost_i, BaseWeights w) {
+// Of light that passes the base: f lacks the layers. `facets` is base_scatter's.
+Scatter base_eval_below(Surface s, vec3 wo, vec3 wi, vec4 albedo_i, BASE_SHARE lost_i, Scatter facets, BaseWeights w) {
 #if !HAS_THIN_WALLS
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
 #endif
-    vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
     vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, shares_lost(s), lost_i));
     float pdf = w.diffuse_below * INV_PI * -wi.z;
 #if HAS_THIN_WALLS
     if (s.is_thin) {
-        Scatter through = pane_eval(s, wo_t, base_image(wi_t), albedo_i, w.specular);
+        vec3 wo_t = bsdf_turn(s, wo), image_t = bsdf_turn(s, base_image(wi));
+        Scatter through = pane_eval(s, wo_t, image_t, albedo_i, w.specular, base_level(s, wo).chance);
         return Scatter(f + LOBE(LOBE_TRANSMISSION, through.f), pdf + through.pdf);
     }
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
 #endif
-    vec3 wm = base_half_vector(s, wo_t, wi_t);
     if (!s.is_delta && !s.index_matched) {
-        pdf += w.specular * base_transmit_folded(s, wo_t, wi_t);
-        if (wm.z > 0.0) {
-            f += LOBE(LOBE_TRANSMISSION, base_transmit(s, wo_t, wi_t, wm));
-            pdf += w.specular * base_transmit_pdf(s, wo_t, wi_t, wm);
-        }
+        f += LOBE(LOBE_TRANSMISSION, facets.f);
+        pdf += w.specular * facets.pdf;
     }
     return Scatter(f, pdf);
 }
 #endif
 
-// Of light that the base scatters back, without the perfectly specular lobes; `diffuse` is the diffuse lobe's.
-Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, BASE_SHARE lost_i, vec3 diffuse, BaseWeights w) {
-    float cos_d = dot(wo, wm);
-    vec3 wo_t = wo, wi_t = wi, wm_t = wm;
-#if HAS_ANISOTROPIC
-    wo_t = bsdf_turn(s, wo);
-    wi_t = bsdf_turn(s, wi);
-    wm_t = bsdf_turn(s, wm);
-#endif
+// Of light that the base scatters back, without the perfectly specular lobes; `diffuse` is the diffuse lobe's, `facets`
+// base_scatter's.
+Scatter base_eval(Surface s, vec3 wi, vec4 albedo_i, BASE_SHARE lost_i, vec3 diffuse, Scatter facets, BaseWeights w) {
     vec3 f = LOBE(LOBE_DIFFUSE, diffuse);
     vec3 again = multiscatter_reflect(s, albedo_i, base_multiscatter(s));
 #if HAS_TRANSMISSION
@@ -137,11 +132,8 @@ Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, BASE_SHAR
     f += LOBE(LOBE_MULTISCATTER, again);
     float pdf = w.diffuse * INV_PI * wi.z;
     if (!s.is_delta) {
-        f += LOBE(LOBE_SPECULAR, base_reflect(s, wo_t, wi_t, wm_t, cos_d));
-        pdf += w.specular * base_reflect_pdf(s, wo_t, wm_t, cos_d);
-#if HAS_TRANSMISSION
-        pdf += w.specular * base_reflect_folded(s, wo_t, wi_t);
-#endif
+        f += LOBE(LOBE_SPECULAR, facets.f);
+        pdf += w.specular * facets.pdf;
     }
     return Scatter(f, pdf);
 }
@@ -149,14 +141,14 @@ Scatter base_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, vec4 albedo_i, BASE_SHAR
 // Samples the microfacets, which are picked with the chance `weight`; v picks reflection or refraction. The f of a
 // perfectly specular sample lacks the layers.
 LobeSample base_sample_facet(Surface s, vec3 wo, float v, vec2 u, float weight) {
-    vec3 wi = bsdf_turn_back(s, base_sample(s, bsdf_turn(s, wo), v, u));
+    BaseFacet level = base_level(s, wo);
+    float chance = level.chance;
+    vec3 wi = bsdf_turn_back(s, base_sample(s, bsdf_turn(s, wo), v, chance, u)), f = level.reflected;
     LobeSample r = LobeSample(wi, s.is_delta, Scatter(vec3(0.0), 0.0), false);
-    float chance = base_reflect_chance(s, wo.z);
-    vec3 f = base_fresnel(s, wo.z);
 #if HAS_TRANSMISSION
     if (wi.z < 0.0) {
         if (s.index_matched) r.is_delta = true;
-        f = base_transmittance(s, wo.z);
+        f = level.passed;
         chance = 1.0 - chance;
     }
 #endif
@@ -168,17 +160,19 @@ LobeSample base_sample_facet(Surface s, vec3 wo, float v, vec2 u, float weight) 
 // with a chance of at least `least`. Sets the members that path_extend reads.
 LobeSample base_sample_delta(vec3 wo, bool behind, float u_lobe, float least, inout Surface s) {
     base_side(behind, s);
+    BaseFacet level = base_meets(s, wo.z);
 #if HAS_FILM
-    s.film_cosine = wo.z;
+    float chance = level.chance;
+#else
+    float chance = base_chance(s, wo, wo.z, level);
 #endif
-    float chance = base_reflect_chance(s, wo.z);
 #if HAS_TRANSMISSION
     if (chance > 0.0 && chance < 1.0) chance = clamp(chance, least, 1.0 - least);
 #endif
-    vec3 wi = base_sample(s, wo, u_lobe < chance ? 0.0 : 1.0, vec2(0.0));
-    Scatter scatter = Scatter(base_fresnel(s, wo.z), chance);
+    vec3 wi = base_sample(s, wo, u_lobe, chance, vec2(0.0));
+    Scatter scatter = Scatter(level.reflected, chance);
 #if HAS_TRANSMISSION
-    if (u_lobe >= chance) scatter = Scatter(base_transmittance(s, wo.z), 1.0 - chance);
+    if (u_lobe >= chance) scatter = Scatter(level.passed, 1.0 - chance);
 #endif
     return LobeSample(wi, true, scatter, false);
 }
@@ -189,8 +183,7 @@ vec3 base_straight(vec3 wo, bool behind, inout Surface s) {
     base_side(behind, s);
 #if HAS_FILM
     s.albedo = vec4(0.0); // nothing is reflected by facets of index 1
-    s.film_cosine = wo.z;
 #endif
-    return base_transmittance(s, wo.z);
+    return base_meets(s, wo.z).passed;
 }
 #endif

@@ -15,7 +15,8 @@ void film_surface(Material m, inout Surface s) {
     s.film_base = s.film_bends = s.eta_outside;
     s.film_mean = s.film_once = s.film_kept = s.film_kept_mean = vec3(0.0);
     s.film_lost = s.film_lost_outside = s.film_lost_inside = vec3(0.0);
-    s.film_cosine = 1.0;
+    s.film_reflected = s.film_passed = vec3(0.0);
+    s.film_chance = 1.0;
 #endif
 #if HAS_METAL_FILM
     s.film_eta = s.film_k = s.film_metal_mean = vec3(0.0);

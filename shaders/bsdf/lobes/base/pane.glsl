@@ -2,11 +2,9 @@
 // reflected to and fro: of two faces of reflectance R a pane reflects 2 R / (1 + R), and passes (1 - R) / (1 + R), which
 // its colour tints once. The pane is the same from both sides, and the index is that of wo's side on both.
 #if ANY_NEEDS_TABLES && HAS_THIN_WALLS
-BASE_SHARE base_dielectric(Surface s, float c, float eta); // bsdf/lobes/base/specular.glsl
-BASE_SHARE base_dielectric_mean(Surface s);
+BASE_SHARE base_dielectric_mean(Surface s); // bsdf/lobes/base/multiscatter.glsl
 BASE_SHARE shares_once(Surface s, vec3 w, vec4 albedo); // bsdf/lobes/base/shares.glsl
 BASE_SHARE shares_once(Surface s);
-vec3 base_fresnel(Surface s, float c);
 
 // What goes through bends at two rough faces, which turn it by (eta - 1) times the difference of their slopes where a
 // reflection turns by twice a slope. So alpha is less by (eta - 1) / sqrt(2) for facets whose slopes have a variance;
@@ -30,12 +28,6 @@ float pane_reflected(vec4 albedo) { return 2.0 * albedo.x * albedo.y / max(albed
 
 vec3 pane_reflected(float one, vec3 once) { return 2.0 * one * once / max(one + once, 1e-6); }
 float pane_reflected(float one, float once) { return pane_reflected(vec4(one, once, 0.0, 0.0)); }
-
-// The same of the pane seen from wo, or of the smooth one, which has no table.
-BASE_SHARE pane_reflected(Surface s, float c) {
-    if (s.is_delta) return pane_of(base_dielectric(s, c, s.eta_outside));
-    return pane_reflected(s.albedo.x, shares_once(s));
-}
 
 // What else gets lost in a rough pane: pane_reflected is too high, and light that goes through pays for the more
 // reflecting of the two directions. Polynomials in the place of the index and of the roughness in the tables and in the
@@ -81,12 +73,6 @@ vec3 pane_transmittance(Surface s, BASE_SHARE reflected) {
     return (1.0 - s.metallic) * s.transmission * (1.0 - reflected) * s.clear_color;
 }
 
-// The chance of reflecting rather than passing, which does not depend on the facet.
-float pane_reflect_chance(Surface s, float c) {
-    float r = luminance(base_fresnel(s, c)), t = luminance(pane_transmittance(s, pane_reflected(s, c)));
-    return t > 0.0 ? r / (r + t) : 1.0;
-}
-
 // A direction that goes through, or zero where it would come back.
 vec3 pane_sample(Surface s, vec3 wo, vec2 u) {
     vec3 wm = s.is_delta ? vec3(0.0, 0.0, 1.0) : ggx_visible_normal(wo, pane_alpha(s), u);
@@ -96,13 +82,13 @@ vec3 pane_sample(Surface s, vec3 wo, vec2 u) {
 
 // Of light that passes by the microfacets: f lacks the layers. wo_t and image_t, wi's mirror image, are in the lobe's
 // frame.
-Scatter pane_eval(Surface s, vec3 wo_t, vec3 image_t, vec4 albedo_i, float weight) {
+Scatter pane_eval(Surface s, vec3 wo_t, vec3 image_t, vec4 albedo_i, float weight, float chance) {
     if (s.is_delta || s.index_matched || s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
     vec2 alpha = pane_alpha(s);
     vec3 wm = normalize(wo_t + image_t);
     BASE_SHARE there = pane_reflected(albedo_i.x, shares_once(s, image_t, albedo_i));
     BASE_SHARE reflected = max(pane_reflected(s.albedo.x, shares_once(s)), there);
     vec3 f = pane_transmittance(s, reflected) * (ggx_d(wm, alpha) * ggx_visibility(wo_t, image_t, alpha));
-    return Scatter(f, weight * (1.0 - pane_reflect_chance(s, wo_t.z)) * ggx_visible_pdf(wo_t, wm, alpha));
+    return Scatter(f, weight * (1.0 - chance) * ggx_visible_pdf(wo_t, wm, alpha));
 }
 #endif

@@ -191,7 +191,6 @@ void shares_face(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
     s.albedo = albedo;
     s.albedo_mean = albedo_mean;
 #if HAS_FILM
-    s.film_cosine = wo.z;
     if (s.film > 0.0) shares_face_film(wo, albedo, albedo_mean, s);
 #endif
 #if HAS_METAL_FILM

@@ -26,60 +26,84 @@ vec3 base_metal(Surface s, float c) {
     return f;
 }
 
-vec3 base_fresnel(Surface s, float c) {
-    vec3 clear = models_tinted(s, base_dielectric(s, c, s.eta_outside));
-#if HAS_THIN_WALLS
-    vec3 facets = s.is_thin ? pane_of(clear) : models_tinted(s, base_dielectric(s, c, s.eta));
-    clear = mix(clear, facets, s.transmission);
-#elif HAS_TRANSMISSION
-    clear = mix(clear, models_tinted(s, base_dielectric(s, c, s.eta)), s.transmission);
-#endif
-    return mix(clear, base_metal(s, c), s.metallic);
-}
+// What a facet does to light that meets it at a cosine.
+struct BaseFacet {
+    vec3 reflected;
+    vec3 passed;
+    float chance; // of reflecting rather than refracting
+};
 
-vec3 base_transmittance(Surface s, float c) {
+#if HAS_TRANSMISSION
+// The share that a facet passes which reflects `r`; of what goes straight through rough facets with a film all that these
+// do not reflect.
+vec3 base_passed(Surface s, BASE_SHARE r) {
+    vec3 kept = vec3(r);
+#if HAS_THIN_WALLS
+    if (s.is_thin) kept = vec3(pane_of(r));
+#endif
 #if HAS_FILM
-    // What passes straight through a film of rough facets is what they do not reflect in all.
     if (s.index_matched && !s.is_delta) {
-        vec3 kept = s.film_kept;
+        kept = s.film_kept;
 #if HAS_THIN_WALLS
         if (s.is_thin) kept = pane_reflected(s.albedo.x, s.film_once);
 #endif
-        return (1.0 - s.metallic) * s.transmission * (1.0 - kept) * s.clear_color;
     }
 #endif
-#if HAS_THIN_WALLS
-    BASE_SHARE r = base_dielectric(s, c, s.is_thin ? s.eta_outside : s.eta);
-    if (s.is_thin) r = pane_of(r);
-    return (1.0 - s.metallic) * s.transmission * (1.0 - r) * s.clear_color;
-#endif
-    return (1.0 - s.metallic) * s.transmission * (1.0 - base_dielectric(s, c, s.eta)) * s.clear_color;
+    return (1.0 - s.metallic) * s.transmission * (1.0 - kept) * s.clear_color;
 }
 
-// The chance of reflecting rather than refracting at a facet that light hits at cosine c.
-float base_reflect_chance(Surface s, float c) {
-#if HAS_TRANSMISSION
-#if HAS_FILM
-    if (s.index_matched) c = s.film_cosine;
-#else
-    if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
-#endif
+// What goes through in all: of rough panes that is the same whatever the facet.
+vec3 base_through(Surface s, vec3 passed) {
 #if HAS_THIN_WALLS
-    if (s.is_thin) return pane_reflect_chance(s, c);
+    if (s.is_thin && !s.is_delta) return pane_transmittance(s, pane_reflected(s.albedo.x, shares_once(s)));
 #endif
-    float r = luminance(base_fresnel(s, c)), t = luminance(base_transmittance(s, c));
+    return passed;
+}
+#endif
+
+// The facet that light meets at cosine c.
+BaseFacet base_meets(Surface s, float c) {
+    BaseFacet r = BaseFacet(vec3(0.0), vec3(0.0), 1.0);
+    BASE_SHARE outer = BASE_SHARE(0.0), own = outer;
+    bool same = true; // both sides of what is seen reflect as the outer one
+#if HAS_TRANSMISSION
+    same = s.eta == s.eta_outside;
+#if HAS_THIN_WALLS
+    same = same || s.is_thin;
+#endif
+#endif
+#if HAS_FILM
+    for (int k = 0; k < (same ? 1 : 2); k++) { // a loop, so that drivers have the film once
+        own = base_dielectric(s, c, k == 0 ? s.eta_outside : s.eta);
+        if (k == 0) outer = own;
+    }
+#else
+    outer = base_dielectric(s, c, s.eta_outside);
+    own = same ? outer : base_dielectric(s, c, s.eta);
+#endif
+    vec3 clear = models_tinted(s, outer);
+#if HAS_TRANSMISSION
+    vec3 facets = models_tinted(s, own);
+#if HAS_THIN_WALLS
+    if (s.is_thin) facets = pane_of(facets);
+#endif
+    clear = mix(clear, facets, s.transmission);
+    r.passed = base_passed(s, own);
+#endif
+    r.reflected = mix(clear, base_metal(s, c), s.metallic);
+#if HAS_TRANSMISSION
+    float up = luminance(r.reflected), down = luminance(base_through(s, r.passed));
+    if (down > 0.0) r.chance = up / (up + down);
 #if HAS_FILM
     // A film on nothing may reflect nothing for wo and much at its facets.
-    if (s.index_matched && s.film > 0.0 && t > 0.0) return clamp(r / (r + t), 0.05, 0.95);
+    bool clamps = s.index_matched && s.film > 0.0 && down > 0.0;
+#if HAS_THIN_WALLS
+    clamps = clamps && !s.is_thin;
 #endif
-    return t > 0.0 ? r / (r + t) : 1.0;
-#else
-    return 1.0;
+    if (clamps) r.chance = clamp(r.chance, 0.05, 0.95);
 #endif
-}
-
-vec3 base_reflect(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
-    return base_fresnel(s, cos_d) * (ggx_d(wm, s.alpha) * ggx_visibility(wo, wi, s.alpha));
+#endif
+    return r;
 }
 
 // The cosine that decides on the chance of reflecting: that at the facet, but for panes that of wo.
@@ -89,6 +113,35 @@ float base_deciding(Surface s, vec3 wo, float cos_d) {
 #endif
     return cos_d;
 }
+
+// The chance of reflecting rather than refracting at a facet that light hits at cosine c. That of a perfectly specular
+// event must not depend on the facet.
+float base_chance(Surface s, vec3 wo, float c, BaseFacet facet) {
+#if HAS_FILM
+    bool same = s.index_matched;
+#if HAS_THIN_WALLS
+    same = same || s.is_thin;
+#endif
+    return same ? s.film_chance : facet.chance;
+#elif HAS_TRANSMISSION
+    return base_meets(s, s.index_matched ? 1.0 : base_deciding(s, wo, c)).chance;
+#else
+    return 1.0;
+#endif
+}
+
+// A facet that wo hits as it does the surface, once base_face has been called.
+BaseFacet base_level(Surface s, vec3 wo) {
+#if HAS_FILM
+    return BaseFacet(s.film_reflected, s.film_passed, s.film_chance);
+#else
+    BaseFacet r = base_meets(s, wo.z);
+    r.chance = base_chance(s, wo, wo.z, r);
+    return r;
+#endif
+}
+
+vec3 base_fresnel(Surface s, float c) { return base_meets(s, c).reflected; }
 
 bool base_folds(Surface s) {
 #if HAS_THIN_WALLS
@@ -107,10 +160,6 @@ bool base_folds(Surface s) {
 // possible value half as much as without, for alphas from 0.3 on; from 1 on a narrower lobe would miss the tails.
 vec2 base_sampled_alpha(Surface s) { return base_folds(s) ? s.alpha / (1.0 + 0.4 * min(s.alpha, vec2(1.0))) : s.alpha; }
 
-float base_reflect_pdf(Surface s, vec3 wo, vec3 wm, float cos_d) {
-    return ggx_visible_pdf(wo, wm, base_sampled_alpha(s)) * base_reflect_chance(s, base_deciding(s, wo, cos_d));
-}
-
 #if HAS_TRANSMISSION
 // The normal of the facet that refracts wo into wi; its z is 0 where there is none.
 vec3 base_half_vector(Surface s, vec3 wo, vec3 wi) {
@@ -127,42 +176,57 @@ float base_jacobian(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     return 4.0 * c * abs(e) * s.eta / sqr(c + e);
 }
 
-// [Walter et al. 2007, eq. 21] without the cosine of wi; the masking of the two sides is multiplied.
-vec3 base_transmit(Surface s, vec3 wo, vec3 wi, vec3 wm) {
-    float g = 1.0 / ((abs(wo.z) + ggx_stretch(wo, s.alpha)) * (abs(wi.z) + ggx_stretch(wi, s.alpha)));
-    return base_transmittance(s, dot(wo, wm)) * (g * ggx_d(wm, s.alpha) * base_jacobian(s, wo, wi, wm));
-}
-
-float base_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
-    float c = dot(wo, wm);
-    return ggx_visible_pdf(wo, wm, base_sampled_alpha(s)) * base_jacobian(s, wo, wi, wm)
-         * (1.0 - base_reflect_chance(s, c));
-}
-
 vec3 base_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
-
-// The density of wi as the image of a direction on the wrong side of the surface.
-float base_reflect_folded(Surface s, vec3 wo, vec3 wi) {
-    vec3 wm = wo + base_image(wi);
-    if (wm.z <= 0.0 || !base_folds(s)) return 0.0;
-    wm = normalize(wm);
-    return base_reflect_pdf(s, wo, wm, dot(wo, wm));
-}
-
-float base_transmit_folded(Surface s, vec3 wo, vec3 wi) {
-    vec3 image = base_image(wi), wm = base_half_vector(s, wo, image);
-    return wm.z > 0.0 ? base_transmit_pdf(s, wo, image, wm) : 0.0;
-}
 #endif
 
-// A direction reflected or refracted at a visible facet; v decides which. Where the reflected one ends below the
+// What the facets scatter from wo into wi without the cosine of wi, and the density with which base_sample gives wi. That
+// has two parts, as wi may also be the image of a direction on the wrong side of the surface; a loop has both, so that
+// drivers have the facet once.
+Scatter base_scatter(Surface s, vec3 wo, vec3 wi) {
+    Scatter r = Scatter(vec3(0.0), 0.0);
+    vec2 sampled = base_sampled_alpha(s);
+    vec3 to = wi;
+    bool own = true;
+#if HAS_TRANSMISSION
+    bool up = wi.z > 0.0;
+    for (int k = 0; k < (base_folds(s) ? 2 : 1); k++) {
+        vec3 wm = up ? normalize(wo + to) : base_half_vector(s, wo, to);
+#else
+    {
+        vec3 wm = normalize(wo + to);
+#endif
+        float c = dot(wo, wm), bends = 1.0;
+        BaseFacet facet = base_meets(s, c);
+        float chance = base_chance(s, wo, c, facet), d = ggx_d(wm, s.alpha);
+        vec3 f = facet.reflected * (d * ggx_visibility(wo, to, s.alpha));
+#if HAS_TRANSMISSION
+        if (!up) { // [Walter et al. 2007, eq. 21]; the masking of the two sides is multiplied
+            float g = 1.0 / ((abs(wo.z) + ggx_stretch(wo, s.alpha)) * (abs(to.z) + ggx_stretch(to, s.alpha)));
+            bends = base_jacobian(s, wo, to, wm);
+            f = facet.passed * (g * d * bends);
+            chance = 1.0 - chance;
+        }
+#endif
+        if (wm.z > 0.0) {
+            if (own) r.f = f;
+            r.pdf += ggx_visible_pdf(wo, wm, sampled) * bends * chance;
+        }
+#if HAS_TRANSMISSION
+        to = base_image(wi);
+        own = false;
+#endif
+    }
+    return r;
+}
+
+// A direction reflected or refracted at a visible facet; v decides which, by `chance` where the surface is smooth. Where the reflected one ends below the
 // surface, or the refracted one above it, light meets another facet. With glass, where many such losses would add up,
 // the image on the right side of the surface stands for that.
-vec3 base_sample(Surface s, vec3 wo, float v, vec2 u) {
+vec3 base_sample(Surface s, vec3 wo, float v, float chance, vec2 u) {
     vec3 wm = s.is_delta ? vec3(0.0, 0.0, 1.0) : ggx_visible_normal(wo, base_sampled_alpha(s), u);
     float c = dot(wo, wm);
 #if HAS_TRANSMISSION
-    if (v >= base_reflect_chance(s, base_deciding(s, wo, c))) {
+    if (v >= (s.is_delta ? chance : base_chance(s, wo, c, base_meets(s, c)))) {
         if (s.index_matched) return -wo;
 #if HAS_THIN_WALLS
         if (s.is_thin) return pane_sample(s, wo, u);
