@@ -27,8 +27,9 @@ export function changed(before, after, materialTitle = inWords) {
   if (parts.length === 1) {
     const [part] = parts;
     if (PARTS[part]) return PARTS[part];
-    const [title, ...others] = ["shapes", "lights"].includes(part) ? own(part).map((key) => titled(after, part, key)) : [];
-    if (title && !others.length) return title;
+    const keys = ["shapes", "lights"].includes(part) ? own(part) : [];
+    const title = keys.length === 1 ? titled(after, part, keys[0]) : null;
+    if (title) return title;
     if (part === "lights") return "the lights";
   }
   return "the change";
