@@ -40,12 +40,12 @@ def missing() -> str | None:
     return None
 
 
-def denoise(color: np.ndarray, albedo: np.ndarray, normal: np.ndarray, fine: bool = True) -> np.ndarray:
+def denoise(color: np.ndarray, albedo: np.ndarray | None, normal: np.ndarray | None, fine: bool = True) -> np.ndarray:
     """The picture without its noise: `color` (height, width, 4) linear float32, premultiplied; alpha stays as it is.
 
-    `albedo` 0..1 and `normal` -1..1, (height, width, 3), are averages over the first hits. `fine` takes twice as long
-    and errs less. Finite and non-negative where `color` is; black and tiny pictures come back as they are. Raises
-    RuntimeError where the library fails.
+    `albedo` 0..1 and `normal` -1..1, (height, width, 3), are averages over the first hits, or both None. `fine` takes
+    twice as long and errs less. Finite and non-negative where `color` is; black and tiny pictures come back as they
+    are. Raises RuntimeError where the library fails.
     """
     height, width = color.shape[:2]
     alpha = color[..., 3:]
@@ -59,8 +59,8 @@ def denoise(color: np.ndarray, albedo: np.ndarray, normal: np.ndarray, fine: boo
         relative = (seen / np.float64(typical)).astype(np.float32)  # the library's own exposure fails below 1e-10
     smooth = pyoidn.denoise(
         np.minimum(relative, np.float32(BRIGHTEST)),
-        np.clip(albedo, 0, 1).astype(np.float32),
-        np.clip(normal, -1, 1).astype(np.float32),
+        None if albedo is None else np.clip(albedo, 0, 1).astype(np.float32),
+        None if normal is None else np.clip(normal, -1, 1).astype(np.float32),
         hdr=True,
         quality="high" if fine else "fast",
     )

@@ -71,6 +71,7 @@ class View:
     p3: bool = False  # for a screen with the primaries of Display P3
     lut: Lut | None = None  # what is displayed goes through it last
     prior: bool = False  # until an edited picture has samples, a guess from what it showed before is welcome
+    denoise: bool = False  # while it is noisy, it is shown denoised; what is read of it is not
 
 
 ESTIMATE = View("estimate", encoding="linear")  # colour (4 channels) and variance (3) of the same samples
@@ -347,15 +348,12 @@ class Usage:
 
 @dataclass(frozen=True)
 class Failed:
-    """An update failed: the task goes on with generation `fallback`; None: not before there is a whole scene.
-
-    `refused`: the scene asks for too much.
-    """
+    """An update failed: the task goes on with generation `fallback`; None: not before there is a whole scene."""
 
     task: int
     generation: int
     detail: str
-    refused: bool = False
+    refused: bool = False  # the scene asks for too much
     serial: int | None = None  # of the Read that failed, when only that did
     fallback: int | None = None
 

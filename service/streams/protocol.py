@@ -52,10 +52,19 @@ class View(Model):
             "of its own: what it showed before, corrected by first looks. Their headers say `prior`."
         ),
     ] = False
+    denoise: Annotated[
+        bool,
+        Field(
+            description="Whether frames are shown denoised from the first sample on. That fades as the noise falls "
+            "below 3 %, and ends at 1.5 %. It is for the eye alone: the setting `denoise` is for what is kept. The "
+            "headers of such frames say `denoised`; their `noise` is that of the rendered picture."
+        ),
+    ] = False
 
     def for_renderer(self, lut: messages.Lut | None = None) -> messages.View:
         encoding = images.FORMATS[self.format].encoding(self.bits)
-        return messages.View(self.aov, self.exposure, self.tone_map, encoding, self.p3, lut, self.prior)
+        shown = self.aov, self.exposure, self.tone_map, encoding, self.p3, lut
+        return messages.View(*shown, self.prior, self.denoise)
 
     @property
     def p3(self) -> bool:

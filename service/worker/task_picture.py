@@ -204,7 +204,7 @@ class TaskPicture:
         tracker.generation = update.generation
         updates.settings, tracker.stop = settings, update.stop or tracker.stop
         if update.denoise is not None:
-            self.frames.denoising.wanted = update.denoise
+            self.frames.denoising.want(update.denoise)
         if update.scene is not None:
             tracker.interactive = update.interactive
         tracker.reason, self.frames.owes_done = None, False
@@ -225,7 +225,7 @@ class TaskPicture:
         if update.scene is not None or update.settings is not None:
             self.under_hand.release()
         elif update.restarts and self.tracker.interactive and residency.loaded is not None:
-            self.under_hand.keep(residency.ladder, latest.pixels if latest else None)
+            self.under_hand.keep(residency.ladder, latest.pixels if latest and latest.scale == 1.0 else None)
 
     def evict(self) -> None:
         """Leave the device: for the machine's memory, or for good where the server has the picture already."""
@@ -260,6 +260,7 @@ class TaskPicture:
         """Note which frame is wanted; `answer` sends it."""
         # Who looks at the first hits has more samples of them traced than a guess needs.
         self.under_hand.wanted = want.view.prior and want.view.aov == "color"
+        self.frames.denoising.look(want.view)
         self.frames.want = want
 
     def answer(self) -> bool:

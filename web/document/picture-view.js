@@ -54,6 +54,7 @@ export function viewOf(ui, view, { isPaused, quality, isExact }) {
     format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
     max_fps: painted ? 4 : isExact ? 8 : null,
     prior: !painted && !isExact,
+    denoise: ui.denoised && layer === "color" && !isExact,
   };
 }
 

@@ -3,13 +3,14 @@
 
 const STORED = "sunbox.ui";
 export const HANDLED = ["move", "rotate", "scale"]; // the tools that put handles on the selection
-const LASTING = ["drawer", "theme", "lobe", "outline", "inspector", "hint"];
+const LASTING = ["denoised", "drawer", "theme", "lobe", "outline", "inspector", "hint"];
 
 export class UiState {
   #listeners = [];
   state = {
     tool: "orbit",
     layer: "color",
+    denoised: true, // what is seen while it is noisy; what is saved is as the settings say
     histogram: false,
     clipping: false,
     checker: null,

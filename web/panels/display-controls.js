@@ -5,7 +5,8 @@ import { inWords } from "../lib/format-text.js";
 import { watchMenu } from "../lib/menu.js";
 import { watchTabs } from "../lib/tabs.js";
 
-const OVERLAYS = {
+const SWITCHES = {
+  denoised: "Denoised while it is noisy",
   histogram: "Histogram",
   clipping: "Clipped pixels",
   checker: "Checker behind alpha",
@@ -25,7 +26,7 @@ export class DisplayControls {
     this.layer.append(...page.layers.map((each) => element("option", { value: each }, inWords(each))));
     this.layer.addEventListener("change", () => ui.set({ layer: this.layer.value }));
     find("overlays").append(
-      ...Object.entries(OVERLAYS).map(([member, title]) =>
+      ...Object.entries(SWITCHES).map(([member, title]) =>
         element(
           "label",
           {},
@@ -48,7 +49,7 @@ export class DisplayControls {
     this.layer.value = layer;
     this.find("hint").hidden = !members.hint;
     const isOn = { ...members, checker: this.page.isCheckered };
-    for (const member of Object.keys(OVERLAYS)) this.find(`show-${member}`).checked = isOn[member];
+    for (const member of Object.keys(SWITCHES)) this.find(`show-${member}`).checked = isOn[member];
     if (theme) document.documentElement.dataset.theme = theme;
   }
 }

@@ -4,7 +4,7 @@ import { fullSize } from "../document/picture-view.js";
 import { count, duration, percent } from "../lib/format-text.js";
 
 const NOTHING = "–";
-const PLACES = ["samples", "rate", "noise", "elapsed", "left", "progress", "preview", "state", "size"];
+const PLACES = ["samples", "rate", "noise", "elapsed", "left", "progress", "preview", "denoised", "state", "size"];
 
 export class Status {
   #places = {};
@@ -29,6 +29,7 @@ export class Status {
     places.left.hidden = !eta_s;
     places.progress.value = eta_s === null ? (limit ? samples / limit : 0) : elapsed_s / (elapsed_s + eta_s || 1);
     places.preview.hidden = scale >= 1;
+    places.denoised.hidden = !header.denoised;
     places.preview.textContent = `1/${Math.round(1 / scale)} size`;
   }
 
@@ -36,7 +37,7 @@ export class Status {
   blank() {
     for (const name of ["samples", "rate", "noise", "elapsed", "left", "size"])
       this.#places[name].textContent = NOTHING;
-    for (const name of ["noise", "left", "preview"]) this.#places[name].hidden = true;
+    for (const name of ["noise", "left", "preview", "denoised"]) this.#places[name].hidden = true;
     this.#places.progress.value = 0;
   }
 

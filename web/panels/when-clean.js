@@ -15,7 +15,7 @@ export class WhenClean {
 
   get #isClean() {
     const { header, isDone } = this.page;
-    return isDone || header?.denoised || (header?.noise ?? Infinity) < CLEAN; // what is done gets no cleaner
+    return isDone || this.editor.state.settings.denoise || (header?.noise ?? Infinity) < CLEAN; // what is done gets no cleaner
   }
 
   // Resolves to whether the picture is to be saved, once it is.

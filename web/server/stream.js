@@ -128,8 +128,8 @@ export class Stream {
   #tellView() {
     if (!this.#sent) return;
     const capture = this.#captures[0];
-    // What is kept has no guess in it.
-    const view = { ...this.#sent.view, ...(capture && { prior: false, ...capture.view }) };
+    // What is kept has no guess in it, and is denoised where the settings say so.
+    const view = { ...this.#sent.view, ...(capture && { prior: false, denoise: false, ...capture.view }) };
     this.#seen = null;
     this.#connection.send(message.view(view));
     this.#connection.ask(() => {

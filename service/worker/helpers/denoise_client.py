@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import select
 import socket
@@ -29,8 +30,8 @@ class DenoiseRequest:
     """A picture to denoise, as gpu.denoise.denoise takes it."""
 
     color: np.ndarray
-    albedo: np.ndarray
-    normal: np.ndarray
+    albedo: np.ndarray | None
+    normal: np.ndarray | None
     fine: bool
 
 
@@ -58,6 +59,11 @@ class DenoiseClient:
         return self._told is not None
 
     @property
+    def has_answered(self) -> bool:
+        """Whether its process is there and has loaded what it needs."""
+        return self._took_s > 0.0 and bool(self.ends)
+
+    @property
     def left_s(self) -> float | None:
         """How much longer its answer is worth waiting for, at least 0; None when there is none to come."""
         patience_s = max(PATIENCE_S, PATIENCE * self._took_s)
@@ -76,6 +82,12 @@ class DenoiseClient:
     @property
     def process_id(self) -> int | None:
         return self._helper.process_id
+
+    def start(self) -> None:
+        """Have the process there before the first picture, as it loads its library for most of a second."""
+        if self.missing is None and not self.busy:
+            with contextlib.suppress(OSError):  # the first request says why
+                self._helper.start()
 
     def ask(self, order: DenoiseRequest, told: Callable[[DenoiseResult], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
@@ -113,7 +125,6 @@ class DenoiseClient:
         self._helper.close()
 
 
-def denoise_request(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray], fine: bool) -> DenoiseRequest:
-    return DenoiseRequest(
-        np.ascontiguousarray(color), np.ascontiguousarray(guides[0]), np.ascontiguousarray(guides[1]), fine
-    )
+def denoise_request(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray] | None, fine: bool) -> DenoiseRequest:
+    albedo, normal = (None, None) if guides is None else map(np.ascontiguousarray, guides)
+    return DenoiseRequest(np.ascontiguousarray(color), albedo, normal, fine)

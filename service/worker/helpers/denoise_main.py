@@ -17,7 +17,7 @@ from service.system.lifeline import end_with
 from service.worker.helpers.denoise_client import DenoiseRequest, DenoiseResult
 
 NICENESS = 5  # steps above the renderer's: where both want the processor, this one gets a quarter of it
-IDLE_S = 60.0  # then it ends, and gives back what the library holds (some 200 MB)
+IDLE_S = 300.0  # then it ends, and gives back what the library holds (some 200 MB)
 
 
 def main() -> int:
@@ -30,12 +30,20 @@ def main() -> int:
     hide()
     os.nice(NICENESS)
     with socket.socket(fileno=arguments.descriptor) as end:
+        _load()
         try:
             while select.select([end], [], [], IDLE_S)[0]:
                 channel.send(end, deliver(channel.receive(end, wait=True)))
         except channel.Closed:
             pass
     return 0
+
+
+def _load() -> None:
+    """Load the library before the first picture comes; where that fails, the answer to that one says why."""
+    from gpu import denoise
+
+    denoise.missing()
 
 
 def deliver(order: DenoiseRequest) -> DenoiseResult:

@@ -1,4 +1,7 @@
-"""The denoised form of one task's picture: whether it is wanted, when it is due, and the newest one."""
+"""The denoised form of one task's picture: whether it is wanted, when it is due, and the newest one.
+
+It is wanted by the settings, for what is kept, or by the view, for the eye alone: then it fades as the noise falls.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpu.denoise import GUIDE_SAMPLES
-from service.ipc.messages import Progress
+from service.ipc.messages import Progress, View
 from service.worker.helpers.denoise_client import DenoiseClient, DenoiseResult, denoise_request
 
 if TYPE_CHECKING:
     from gpu import Picture
 
 CLEAN = 0.005  # noise of the rendered picture below which denoising adds more error than it takes away
+# Of a picture that is only shown denoised: it turns into the rendered one between these, so that nobody sees when.
+FADES, FADED = 0.03, 0.015
 # While somebody watches: rest between two of them, in times of what one took; and as a share of the picture's age,
 # so that one that changes slowly is denoised seldom, but at least every second.
 REST, AGE_SHARE, LONGEST_REST_S = 2.0, 0.25, 1.0
@@ -27,12 +32,14 @@ class Denoised:
     pixels: np.ndarray  # (height, width, 4), as Picture.read gives colour
     progress: Progress  # of the picture that was denoised
     fine: bool
+    scale: float = 1.0  # of the picture at full size
 
 
 class DenoisePolicy:
     def __init__(self, denoiser: DenoiseClient, yields: bool) -> None:
         """`yields`: renderer and denoiser share the processor, so that tracing pauses while a picture is denoised."""
-        self.wanted = False
+        self.wanted = False  # by the settings
+        self.live = False  # by the view
         self.latest: Denoised | None = None
         self.pending = False
         self._denoiser = denoiser
@@ -48,11 +55,33 @@ class DenoisePolicy:
         self._age += 1
         self._due_at = 0.0
 
+    def want(self, wanted: bool) -> None:
+        """Take what the settings say; what was made for the eye is not what is kept."""
+        if wanted != self.wanted:
+            self.restart()
+        self.wanted = wanted
+
+    def look(self, view: View) -> None:
+        """Take what the view says."""
+        live = view.denoise and view.aov == "color" and view.encoding != "linear"
+        if live and not self.live:
+            self._denoiser.start()
+        self.live = live
+
     @property
     def warning(self) -> str | None:
         """Why nothing is denoised although it was asked for."""
-        why = self._denoiser.missing or self._failed
+        why = self._why_not
         return f"denoise: the picture is as rendered, for {why}" if self.wanted and why else None
+
+    @property
+    def able(self) -> bool:
+        """Whether the picture is denoised for anybody."""
+        return (self.wanted or self.live) and self._why_not is None
+
+    @property
+    def _why_not(self) -> str | None:
+        return self._denoiser.missing or self._failed
 
     @property
     def holds(self) -> bool:
@@ -64,24 +93,47 @@ class DenoisePolicy:
         """Whether a denoised picture will be there soon."""
         return (self.pending or not self._denoiser.busy) and not self._denoiser.late
 
-    def covers(self, aov: str, noise: float | None) -> bool:
-        """Whether such a picture is shown denoised: not when it is clean, nor when nothing can denoise it."""
-        return self.wanted and aov == "color" and self.warning is None and not (noise is not None and noise < CLEAN)
+    @property
+    def quick(self) -> bool:
+        """Whether it takes so little that even a first look may wait for it: the denoiser has started."""
+        return self._denoiser.has_answered
+
+    def covers(self, aov: str, noise: float | None, kept: bool = False) -> bool:
+        """Whether such a picture is shown denoised, or is where it is `kept`: not when it is clean, nor when nothing
+        can denoise it."""
+        if aov != "color" or not self.able or (kept and not self.wanted):
+            return False
+        return noise is None or noise >= (CLEAN if self.wanted else FADED)
 
     def has(self, samples: int) -> Denoised | None:
         """The final denoised form of a picture with that many samples; None where there is none yet."""
         latest = self.latest
-        return latest if latest is not None and latest.fine and latest.progress.samples == samples else None
+        if latest is None or not latest.fine or latest.scale != 1.0:
+            return None
+        return latest if latest.progress.samples == samples else None
 
-    def due(self, samples: int, fine: bool) -> bool:
+    def due(self, samples: int, fine: bool, scale: float = 1.0) -> bool:
         if samples == 0 or self.pending or self._denoiser.busy:
             return False
-        if fine or self.latest is None:
+        if self.latest is None or self.latest.scale != scale:
+            return True
+        if fine:
             return self.has(samples) is None
         return samples > self.latest.progress.samples and time.monotonic() >= self._due_at
 
-    def begin(self, picture: Picture, progress: Progress, fine: bool, told: Callable[[], None]) -> None:
-        """Have the picture denoised as it is now; `told` is called when that is done or has failed."""
+    def begin(
+        self,
+        picture: Picture,
+        progress: Progress,
+        fine: bool,
+        told: Callable[[], None],
+        scale: float = 1.0,
+        guided: bool = True,
+    ) -> None:
+        """Have the picture denoised as it is now; `told` is called when that is done or has failed. Without being
+        `guided` by the first hits it is worse, and at hand before there is a kernel for those."""
+        color, guides = picture.read(), picture.guides(GUIDE_SAMPLES) if guided else None
+        weight = self._weight(progress.noise)
         self.pending = True
         age, began = self._age, time.monotonic()
 
@@ -93,7 +145,14 @@ class DenoisePolicy:
             if delivery.pixels is None:
                 self._failed = delivery.detail
             else:
-                self.latest = Denoised(delivery.pixels, progress, fine)
+                shown = delivery.pixels if weight == 1.0 else color + np.float32(weight) * (delivery.pixels - color)
+                self.latest = Denoised(shown, progress, fine, scale)
             told()
 
-        self._denoiser.ask(denoise_request(picture.read(), picture.guides(GUIDE_SAMPLES), fine), hear)
+        self._denoiser.ask(denoise_request(color, guides, fine), hear)
+
+    def _weight(self, noise: float | None) -> float:
+        """How much of the denoised picture there is in what is shown."""
+        if self.wanted or noise is None:
+            return 1.0
+        return min(max((noise - FADED) / (FADES - FADED), 0.0), 1.0)

@@ -33,7 +33,8 @@ class _Content(NamedTuple):
     scale: float
     samples: int
     reason: Reason | None  # why the render has ended
-    fine: bool  # denoised with the fine network
+    clean: bool  # denoised
+    fine: bool  # with the fine network
 
 
 class FrameSource:
@@ -114,19 +115,22 @@ class FrameSource:
         picture = self._residency.ladder.picture(shown)
         if self._needs_guides(picture, want.view):
             return False
+        prior = self._guess(want.view, shown) if shown < 1.0 else None
         clean = None
-        if shown == 1.0 and self.denoising.covers(want.view.aov, tracker.meter.noise):
-            clean = self._denoised_frame()
+        if self._smooths(shown, prior) and self.denoising.covers(want.view.aov, tracker.meter.noise):
+            clean = self._denoised_frame(shown)
             if clean is None and self._holds_frame(want):
                 return False
         progress = clean.progress if clean else tracker.progress(self._residency, shown)
         whole = clean is None or clean is self.denoising.has(picture.samples)
         fine = clean is not None and clean.fine
-        content = _Content(tracker.generation, shown, progress.samples, tracker.reason, fine)
+        content = _Content(tracker.generation, shown, progress.samples, tracker.reason, clean is not None, fine)
         if content == self._served and not want.anyway:
             return False
         last = tracker.reason is not None and whole
-        prior = None if clean or last else self._guess(want.view, shown)
+        if shown == 1.0 and not clean and not last:
+            prior = self._guess(want.view, shown)
+        prior = None if last else prior
         pixels = pixels_of(self._residency.full if prior else picture, want.view, clean, prior)
         self._served, self.want = content, None
         what = pixels, progress, shown, last, clean is not None, prior is not None
@@ -138,19 +142,29 @@ class FrameSource:
         shows = view.prior and view.aov == "color" and view.encoding != "linear"
         return self._under_hand.shown(self._residency.ladder, scale) if shows else None
 
-    def _denoised_frame(self) -> Denoised | None:
+    def _smooths(self, shown: float, prior: Prior | None) -> bool:
+        """Whether a picture of that scale may be shown denoised: a small one of the view's, where no guess at the
+        full one serves better."""
+        return shown == 1.0 or (self.denoising.live and prior is None)
+
+    def _denoised_frame(self, shown: float) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
         latest, served = self.denoising.latest, self._served
-        if latest is None or served is None or (served.generation, served.scale) != (self._tracker.generation, 1.0):
+        if latest is None or latest.scale != shown:
+            return None
+        if served is None or (served.generation, served.scale) != (self._tracker.generation, shown):
             return latest
         samples, seen = latest.progress.samples, served.samples
-        stale = samples == seen < self._residency.full.samples and not self.denoising.under_way
+        traced = self._residency.ladder.picture(shown).samples
+        stale = samples == seen < traced and not self.denoising.under_way
         return None if samples < seen or stale else latest
 
     def _holds_frame(self, want: Want) -> bool:
-        """Whether the client has something to look at until the denoised picture comes, which can't be long."""
+        """Whether the client has something to look at until the denoised picture comes, which can't be long; or waits
+        for that alone, where it is there in a moment."""
         seen = self._served is not None and self._served.generation == self._tracker.generation
-        return self.denoising.under_way and seen and not want.anyway
+        waits = seen or (self.denoising.live and self.denoising.quick)
+        return self.denoising.under_way and waits and not want.anyway
 
     def read(self, read: Read) -> None:
         self._residency.wake()
@@ -159,7 +173,8 @@ class FrameSource:
             self._reads.append(read)
             return
         clean = None
-        if full is not None and self.denoising.covers(read.view.aov, self._tracker.meter.read(full, fresh=True)):
+        noise = None if full is None else self._tracker.meter.read(full, fresh=True)
+        if full is not None and self.denoising.covers(read.view.aov, noise, kept=True):
             clean = self.denoising.has(full.samples)
             if clean is None:
                 self._denoised_reads.append(read)
@@ -175,13 +190,17 @@ class FrameSource:
     @property
     def _denoising_due(self) -> bool:
         """Whether somebody waits for the picture to be denoised, and it can be."""
-        if self._residency.loaded is None or self.scale != 1.0 or not self.denoising.wanted:
+        denoising, scale = self.denoising, self.scale
+        if self._residency.loaded is None or scale is None or not denoising.able:
             return False
         want = self.want if self._tracker.interactive else None
-        watched = want is not None and self.denoising.covers(want.view.aov, self._tracker.meter.noise)
+        watched = want is not None and denoising.covers(want.view.aov, self._tracker.meter.noise)
         if not (watched or self.owes_done or self._denoised_reads):
             return False
-        return self.denoising.due(self._residency.full.samples, fine=self._denoises_finely)
+        prior = None if want is None or scale == 1.0 else self._guess(want.view, scale)
+        if not self._smooths(scale, prior):
+            return False
+        return denoising.due(self._residency.ladder.picture(scale).samples, self._denoises_finely, scale)
 
     @property
     def _denoises_finely(self) -> bool:
@@ -199,12 +218,15 @@ class FrameSource:
             return True
         if not self._denoising_due:
             return False
-        full, tracker = self._residency.full, self._tracker
-        if self._waits(full):
+        tracker, scale, fine = self._tracker, self.scale or 1.0, self._denoises_finely
+        picture = self._residency.ladder.picture(scale)
+        guided = not self._waits(picture)
+        if not guided and fine:
             return True
-        if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
-            tracker.meter.read(full, fresh=True)
-            self.denoising.begin(full, tracker.progress(self._residency), self._denoises_finely, self._hear_denoised)
+        if not guided or picture.trace_guides(SLICE_S, GUIDE_SAMPLES):
+            tracker.meter.read(self._residency.full, fresh=True)
+            progress = tracker.progress(self._residency, scale)
+            self.denoising.begin(picture, progress, fine, self._hear_denoised, scale, guided)
         return True
 
     def _hear_denoised(self) -> None:
@@ -235,7 +257,7 @@ class FrameSource:
     def trace_first_hit(self, picture: Picture) -> bool | None:
         """Trace a slice of one sample of the AOVs of the first hit; whether it is complete. None while the kernel for
         it is compiled, or where the denoiser has them traced."""
-        if self.denoising.wanted or self._waits(picture):
+        if self.denoising.able or self._waits(picture):
             return None
         if not picture.guided:
             self._residency.make_room(picture_bytes(picture.settings, True) - picture_bytes(picture.settings))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 MOST_PIXELS = 1 << 19
 LEAST_SAMPLES = 4  # of a picture that is worth keeping ...
 GOOD_SAMPLES = 16  # ... in the place of an earlier one, from which edits have led away
+DENOISED = 4  # how many times as many samples one stands for that was denoised
 # How many samples a pixel of the guess counts for, until the picture has as many of its own as stand before it.
 WORTH = ((16, 8.0), (32, 4.0), (64, 2.0))
 
@@ -58,8 +59,10 @@ class UnderHand:
         return scale if scale < 1.0 else None
 
     def _fits(self, full: Picture) -> bool:
-        pixels = full.settings.width * full.settings.height
-        return self.wanted and pixels <= MOST_PIXELS and full.samples >= LEAST_SAMPLES
+        return self._small(full) and full.samples >= LEAST_SAMPLES
+
+    def _small(self, full: Picture) -> bool:
+        return self.wanted and full.settings.width * full.settings.height <= MOST_PIXELS
 
     def lacks_depth(self, full: Picture) -> bool:
         """Whether its depth is wanted, by which the picture can be seen from elsewhere, and was not traced."""
@@ -69,7 +72,8 @@ class UnderHand:
         """Keep the picture, or its denoised form, before an edit. One that has too few samples leaves the one that
         was kept before."""
         full = ladder.full
-        if not self._fits(full) or (self._prior is not None and full.samples < GOOD_SAMPLES):
+        worth = full.samples * (1 if clean is None else DENOISED)
+        if not self._small(full) or worth < (LEAST_SAMPLES if self._prior is None else GOOD_SAMPLES):
             return
         self.release()
         size = full.settings.width, full.settings.height
