@@ -140,6 +140,19 @@ def test_a_first_look_reports_its_noise(gpu: Renderer) -> None:
     assert all((report.noise is None) == (report.samples < 2) for report in reports)
 
 
+def test_a_first_look_is_denoised_for_the_eye_alone(gpu: Renderer) -> None:
+    sent: list[Any] = []
+    look = FirstLook(1, sent.append, gpu, lambda color: np.ones_like(color))
+    look.begin(gpu.load(arrays_of(SCENE)), RenderSettings(64, 64), 1)
+    look.step()
+    views = View(denoise=True), View(), View(encoding="linear", denoise=True)
+    for view in views:
+        look.answer(Want(1, 1, view, anyway=True))
+    look.release()
+    assert [frame.denoised for frame in sent] == [True, False, False]
+    assert [np.ptp(frame.pixels[..., :3]) == 0 for frame in sent] == [True, False, False]
+
+
 def test_a_slider_is_shown_at_once_where_its_superset_kernel_is_there(
     gpu: Renderer, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

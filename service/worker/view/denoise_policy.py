@@ -35,6 +35,11 @@ class Denoised:
     scale: float = 1.0  # of the picture at full size
 
 
+def is_for_the_eye(view: View) -> bool:
+    """Whether a picture is to be seen denoised, whatever is kept of it: numbers are what was rendered."""
+    return view.denoise and view.aov == "color" and view.encoding != "linear"
+
+
 class DenoisePolicy:
     def __init__(self, denoiser: DenoiseClient, yields: bool) -> None:
         """`yields`: renderer and denoiser share the processor, so that tracing pauses while a picture is denoised."""
@@ -63,10 +68,9 @@ class DenoisePolicy:
 
     def look(self, view: View) -> None:
         """Take what the view says."""
-        live = view.denoise and view.aov == "color" and view.encoding != "linear"
-        if live and not self.live:
+        if is_for_the_eye(view) and not self.live:
             self._denoiser.start()
-        self.live = live
+        self.live = is_for_the_eye(view)
 
     @property
     def warning(self) -> str | None:

@@ -9,11 +9,14 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from gpu import FIRST_HIT_AOVS, scene_bytes
 from service.ipc.messages import Frame, FromRenderer, Progress, Want
 from service.worker.device.loaded_scene import KernelRequest
 from service.worker.device.resolution_ladder import FIRST_S, SCALES, SMALLEST_SIDE, ResolutionLadder
 from service.worker.progress.noise import NoiseReading
+from service.worker.view.denoise_policy import Denoised, is_for_the_eye
 from service.worker.view.frames import SLICE_S, pixels_of
 
 if TYPE_CHECKING:
@@ -46,10 +49,17 @@ def serves(wanted: KernelRequest) -> bool:
 class FirstLook:
     """The first looks of one task. Its methods raise what the renderer raises."""
 
-    def __init__(self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer) -> None:
+    def __init__(
+        self,
+        number: int,
+        send: Callable[[FromRenderer], None],
+        renderer: Renderer,
+        denoise: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> None:
+        """`denoise` takes colour, as Picture.read gives it, where this process may be kept waiting by that."""
         self.generation = 0
         self.scale: float | None = None  # of what there is to see
-        self._number, self._send, self._renderer = number, send, renderer
+        self._number, self._send, self._renderer, self._denoise = number, send, renderer, denoise
         self._scene: Scene | None = None
         self._ladder: ResolutionLadder | None = None
         self._next = 1.0  # the scale that is traced
@@ -127,8 +137,11 @@ class FirstLook:
             return False
         self._served, self._shown = content, (self.generation, self.scale)
         progress = Progress(picture.samples, self._meter.read(picture), time.monotonic() - self._began)
-        what = want.serial, self.generation, pixels_of(picture, want.view, None), progress, self.scale
-        self._send(Frame(self._number, *what, last=False, provisional=True))
+        clean = None
+        if self._denoise is not None and is_for_the_eye(want.view):
+            clean = Denoised(self._denoise(picture.read()), progress, False, self.scale)
+        what = want.serial, self.generation, pixels_of(picture, want.view, clean), progress, self.scale
+        self._send(Frame(self._number, *what, last=False, denoised=clean is not None, provisional=True))
         return True
 
     def shown(self, generation: int) -> float:
