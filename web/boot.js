@@ -3,6 +3,7 @@
 import { Problem, fetchPreset, fetchSchema } from "./server/api.js";
 import { askForKey } from "./server/key.js";
 import { openLibrary } from "./forms/library.js";
+import { watchImages } from "./lib/images.js";
 import { readLink, revived } from "./document/share.js";
 import { lastWork } from "./document/work.js";
 
@@ -24,6 +25,7 @@ async function left(complain, asked, work) {
 // The address may ask for a built-in scene once: #scene=cornell-boxes. A reload goes on with the work. `begins(work, name)`
 // is told at once what is to be shown: the work of the last visit or null, else a built-in scene; of a link nothing.
 export async function boot({ keyDialog, told, complain, begins }) {
+  watchImages(document);
   const asked = new URLSearchParams(location.hash.slice(1)).get("scene");
   if (asked) history.replaceState(null, "", location.pathname + location.search);
   const isLink = new URLSearchParams(location.hash.slice(1)).has("v");

@@ -1,6 +1,7 @@
 // The commands of the buttons and the keys: what each one does, and which keys give it.
 
 import { OnDemand } from "./lib/on-demand.js";
+import { whyItStays } from "./document/outline.js";
 import { compared } from "./document/variants.js";
 
 // The copied material: the browser's clipboard where the page may read it, else one of the page's own.
@@ -76,7 +77,9 @@ export function makeCommands({
     undo: () => travel(() => editor.undo()),
     redo: () => travel(() => editor.redo()),
     remove: () => {
-      if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing);
+      const { thing } = editor.state.chosen;
+      if (editor.removable(thing)) editor.remove(thing);
+      else complain(new Error(whyItStays(thing)));
     },
     land: async () => (await controller.tools.get()).handles.land(),
     copyMaterial() {

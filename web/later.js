@@ -159,7 +159,13 @@ export function laterParts({
   sweep.nears(find("sweep-material"));
   find("sweep-material").addEventListener("click", () => sweep.calls("open")(touched, find("material-more")));
 
-  const all = [textures, adder, importer, menus, finals, controller.tools];
+  const turn = new OnDemand(
+    () => import("./panels/environment-turn.js"),
+    ({ EnvironmentTurn }) => new EnvironmentTurn(find("environment-turn"), { schema: schema.scene, acts: editor }),
+    { complain },
+  );
+
+  const all = [textures, adder, importer, menus, finals, controller.tools, turn];
   return {
     comparison,
     textures,

@@ -161,7 +161,7 @@ def test_what_the_header_opens(editor: Editor) -> None:
     page.get_by_role("button", name="Export").click()
     menu = page.get_by_role("menu", name="Export")
     items = [each.get_attribute("aria-label") for each in menu.get_by_role("menuitem").all()]
-    files = ["glTF", "MaterialX", "JSON, scene", "JSON, material"]
+    files = ["glTF", "MaterialX", "JSON", "JSON, material"]
     assert items == ["PNG", "PNG, 16 bit", "EXR", "Share picture", *files, "curl", "Python"]
     page.keyboard.press("ArrowDown")
     assert page.evaluate("document.activeElement.getAttribute('aria-label')") == "PNG, 16 bit"

@@ -30,6 +30,15 @@ export function rows(scene) {
   return made;
 }
 
+const STAYS = {
+  camera: "A scene keeps its camera.",
+  environment: "The environment stays; the shelf has “None” among its environments.",
+  materials: "The shelf has the button that deletes a material.",
+};
+
+// Said of a thing that somebody wanted to delete, and that stays.
+export const whyItStays = (thing) => STAYS[thing.split("/")[1]] ?? "A scene keeps at least one thing.";
+
 // Puts a row after all that stand in its group.
 function insert(made, row, group) {
   if (group === undefined) return made.push(row);

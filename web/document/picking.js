@@ -100,18 +100,3 @@ export class Picker {
     return new Map([...clouds].map(([shape, cloud]) => [shape, boxAround(cloud)]));
   }
 }
-
-// Draws the edge of a shape onto a canvas of the layer's size.
-export function drawOutline(canvas, { floats, width, height }, shape, color) {
-  Object.assign(canvas, { width, height });
-  const context = canvas.getContext("2d");
-  context.fillStyle = color;
-  const has = (i, j) =>
-    i >= 0 && j >= 0 && i < width && j < height && Math.round(floats[4 * (j * width + i)]) === shape + 1;
-  for (let j = 0; j < height; j += 1) {
-    for (let i = 0; i < width; i += 1) {
-      if (has(i, j) && !(has(i - 1, j) && has(i + 1, j) && has(i, j - 1) && has(i, j + 1)))
-        context.fillRect(i - 0.5, j - 0.5, 2, 2);
-    }
-  }
-}

@@ -29,13 +29,15 @@ export function things(scene) {
       title: own(name) || title(`${type} light`),
       note: "",
     })),
-    ...shapes.map((shape, i) => ({
-      thing: pointer("shapes", i),
-      icon: isLamp(scene, shape) ? "light" : shape.type,
-      title:
-        own(shape.name) ||
-        title(isLamp(scene, shape) ? `${shape.type === "quad" ? "area" : shape.type} light` : shape.type),
-      note: shape.material,
-    })),
+    ...shapes.map((shape, i) => {
+      const kind = isLamp(scene, shape) ? `${shape.type === "quad" ? "area" : shape.type} light` : shape.type;
+      const told = own(shape.name) || title(kind);
+      return {
+        thing: pointer("shapes", i),
+        icon: isLamp(scene, shape) ? "light" : shape.type,
+        title: told,
+        note: shape.material.toLowerCase() === told.toLowerCase() ? "" : shape.material, // not the same word twice
+      };
+    }),
   ];
 }

@@ -13,10 +13,14 @@ import { span } from "../lib/span.js";
 const STOPS = 8; // below and above 1 of the unit: how far a slider of strengths goes at least
 const exact = (x) => Number(x.toPrecision(5));
 const UNSET = "–"; // neither document nor schema has a value
+const ROOM = { narrow: 7, wide: 20 }; // letters that a box shows of what holds where it is empty
+
+// What an empty box says of the value that holds: its word, where that has room.
+const placeholder = ({ absent = UNSET }, room) => (absent.length > ROOM[room] ? "auto" : absent);
 
 // A text field: one of type=number swallows what it does not understand, such as the comma of 0,35. Only where
 // a value is never negative may a phone show its keys for decimals: those have no minus.
-function numberEntry(field, id, { input, commit, refuse, restore }) {
+function numberEntry(field, id, { input, commit, refuse, restore }, room = "narrow") {
   const unit = unitText(field.unit);
   let latest = null;
   let scale = span(field.soft, field.step, Boolean(field.ranges));
@@ -91,15 +95,17 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
   const show = (value, effective, ends = field.soft) => {
     latest = value ?? null;
     scale = span(ends, field.step, Boolean(field.ranges));
-    box.placeholder = effective === undefined ? (field.absent ?? UNSET) : compact(effective);
+    box.placeholder = effective === undefined ? placeholder(field, room) : compact(effective);
     const holds = latest ?? effective;
     if (typeof holds === "number") {
       box.setAttribute("role", "spinbutton");
       box.setAttribute("aria-valuenow", String(holds));
-    } else ["role", "aria-valuenow"].forEach((name) => box.removeAttribute(name));
+      box.setAttribute("aria-valuetext", `${compact(holds)} ${unit}`.trim());
+    } else ["role", "aria-valuenow", "aria-valuetext"].forEach((name) => box.removeAttribute(name));
     if (isBeingEdited(box)) return;
     box.value = latest === null ? "" : compact(latest);
-    box.title = latest === null || box.value === String(latest) ? "" : String(latest);
+    if (latest === null) box.title = effective === undefined ? (field.absent ?? "") : "";
+    else box.title = box.value === String(latest) ? "" : String(latest);
   };
   return { element: box, show, drag };
 }
@@ -290,7 +296,8 @@ function color(field, id, { input, commit, refuse, restore }) {
     spellcheck: "false",
     autocomplete: "off",
     "aria-label": `${field.title}, #rrggbb or three linear numbers`,
-    placeholder: field.absent ?? UNSET,
+    placeholder: placeholder(field, "wide"),
+    title: field.absent,
     oninput: () => {
       text.dataset.dirty = "yes";
     },
@@ -385,6 +392,6 @@ export function control(field, id, events) {
   if (field.widget === "file") return fileEntry(id, events);
   if (field.widget === "choice") return choice(field, id, events);
   if (field.widget === "toggle") return toggle(field, id, events);
-  if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
+  if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events, "wide");
   return slider(field, id, events);
 }

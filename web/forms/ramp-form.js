@@ -99,7 +99,7 @@ export class RampForm {
       "×",
     );
     const row = element("div", { class: "stop", role: "group", "aria-label": `Stop ${i + 1}` }, form.element, remove);
-    return { element: row, remove, show: form.show };
+    return { ...form, element: row, remove };
   }
 
   #showInput({ input = property(this.schema, this.model, "input").default }) {
@@ -122,6 +122,11 @@ export class RampForm {
       this.within.replaceChildren(...(this.#inner ? [this.#inner.element] : []));
     }
     if (this.#inner) this.#inner.show(at(this.acts.state, this.#inner.place) ?? {});
+  }
+
+  // The forms inside, each with its place.
+  get parts() {
+    return [this.#inner, ...this.#stops].filter(Boolean);
   }
 
   // A ramp's document.

@@ -59,7 +59,7 @@ function row(field, { change, commit, forgive, takeFile, pickFile, slot, beneath
   const label = element("label", { for: id }, field.title);
   if (field.unit) {
     const unit = unitText(field.unit);
-    label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
+    label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit", "aria-hidden": "true" }, unit)); // said with the value
   }
   if (widget.drag) scrubBy(label, widget.drag);
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;

@@ -8,12 +8,14 @@ import { schemaForm } from "./schema-form.js";
 import { users } from "../document/textures.js";
 import { inWords } from "../lib/format-text.js";
 
-// For the parameter at `place` in the editor's state. `parts` are the forms shown now, each with its place.
+// For the parameter at `place` in the editor's state.
 export class TextureForm {
   #made = null;
+  #ramp = null;
+  #own = []; // the forms of the parameter and of its texture
 
   constructor(field, { schema, place, acts }) {
-    Object.assign(this, { field, schema, place, acts, parts: [] });
+    Object.assign(this, { field, schema, place, acts });
     this.kind = element("span", {});
     this.body = element("div", {});
     this.shared = element("p", { class: "dim" });
@@ -36,24 +38,30 @@ export class TextureForm {
     const made = JSON.stringify([value.texture, texture.type]);
     if (made !== this.#made) {
       this.#made = made;
-      this.parts = [
+      this.#own = [
         this.#part(this.field.reference, this.place),
         this.#part(textureModel(this.schema, texture), pointer("scene", "textures", value.texture)),
       ];
-      this.body.replaceChildren(...this.parts.map((part) => part.element));
-      if (texture.type === "ramp") this.#ramp(value.texture);
+      this.#ramp = null;
+      this.body.replaceChildren(...this.#own.map((part) => part.element));
+      if (texture.type === "ramp") this.#addRamp(value.texture);
     }
-    for (const part of this.parts) part.show(at(this.acts.state, part.place) ?? {});
+    for (const part of [...this.#own, this.#ramp]) part?.show(at(this.acts.state, part.place) ?? {});
     const count = users(scene, value.texture);
     this.shared.hidden = count < 2;
     this.shared.textContent = `How it lies holds for all ${count} parameters that show ${value.texture}.`;
   }
 
+  // The forms that are shown now, each with its place, those inside of others first.
+  get parts() {
+    return [...(this.#ramp?.parts ?? []), ...this.#own];
+  }
+
   // What a ramp reads, and its stops: a form of its own, loaded for the first ramp.
-  async #ramp(name) {
-    const { parts } = this;
+  async #addRamp(name) {
+    const own = this.#own;
     const { RampForm } = await import("./ramp-form.js");
-    if (parts !== this.parts) return;
+    if (own !== this.#own) return;
     const place = pointer("scene", "textures", name);
     const form = new RampForm({
       schema: this.schema,
@@ -61,7 +69,7 @@ export class TextureForm {
       acts: this.acts,
       part: (model, at) => this.#part(model, at),
     });
-    parts.push(form);
+    this.#ramp = form;
     this.body.append(form.element);
     form.show(at(this.acts.state, place) ?? {});
   }

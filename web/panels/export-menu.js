@@ -33,7 +33,7 @@ export class ExportMenu {
       ["Share picture", "with name, material and link", "share-picture", () => this.#try(() => this.#share())],
     ];
     this.documents = [
-      ["JSON, scene", "", "download-scene", json("scene")],
+      ["JSON", "the scene", "download-scene", json("scene")],
       ["JSON, material", "", "download-material", json("material")],
     ];
     this.programs = [

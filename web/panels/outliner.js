@@ -2,7 +2,7 @@
 
 import { additions } from "../document/additions.js";
 import { watchOffers } from "../lib/offers.js";
-import { isNameable, isOn, named, rows, toggled, without } from "../document/outline.js";
+import { isNameable, isOn, named, rows, toggled, whyItStays, without } from "../document/outline.js";
 import { at } from "../lib/patch.js";
 import { element } from "../lib/dom.js";
 import { icon } from "../lib/icon.js";
@@ -167,8 +167,10 @@ export class Outliner {
   #delete() {
     const gone = [...this.#selected].filter((thing) => this.acts.removable(thing));
     const shapes = gone.filter((thing) => thing.startsWith("/shapes/")).length;
-    if (!gone.length) return;
-    if (shapes === this.#state.scene.shapes.length) return this.say("A scene keeps at least one shape");
+    if (!gone.length || shapes === this.#state.scene.shapes.length) {
+      const [first] = gone.length ? gone : this.#selected;
+      return this.acts.complain(new Error(whyItStays(first)));
+    }
     this.acts.change(without(this.#state, gone));
     this.say(`${gone.length === 1 ? "One thing" : `${gone.length} things`} deleted`);
   }

@@ -8,7 +8,7 @@ import { isWorn } from "../document/materials.js";
 import { Carrier } from "./carrier.js";
 import { PictureList } from "../lib/picture-list.js";
 import { element } from "../lib/dom.js";
-import { inWords } from "../lib/format-text.js";
+import { amount, inWords } from "../lib/format-text.js";
 import { watchChoice } from "../lib/tabs.js";
 
 const ALL = "all";
@@ -24,6 +24,9 @@ export class Shelf {
   #kind = ALL;
   #painted = new Map(); // the document that a material's picture was made of, by its name
   #materials = new Map(); // documents of the library that were fetched
+  #origins = new WeakMap(); // what of the library a material of the scene came from
+  #scrolls = new Map(); // how far the library was scrolled, by kind
+  #kindBefore = null; // the kind that was open before a search began; null while nobody searches
 
   // `find(id)` elements; `library` as openLibrary has it; `acts` the editor; `thumbnails`; `saved` the SavedMaterials or
   // null; `rename(name)`, `remove(name)` of materials; `carry`: what Carrier needs beside these.
@@ -50,7 +53,10 @@ export class Shelf {
     });
     this.scenes = new PictureList(find("scenes"), { choose: (name) => acts.pickScene(name) });
     this.#kinds();
-    find("search-library").addEventListener("input", () => this.#list());
+    find("search-library").addEventListener("input", () => this.#search());
+    find("library").addEventListener("scroll", ({ target }) => {
+      if (this.#kindBefore === null) this.#scrolls.set(this.#kind, target.scrollLeft);
+    });
     find("forget-saved").addEventListener("click", () => this.#forget(this.shown.current ?? ""));
     this.#list();
     this.scenes.fill(
@@ -75,42 +81,78 @@ export class Shelf {
         ),
       ),
     );
-    const mark = watchChoice(
+    this.markKind = watchChoice(
       this.find("kinds"),
       "[role=tab]",
-      ({ dataset }) => {
-        this.#kind = dataset.kind;
-        mark((tab) => tab.dataset.kind === this.#kind);
-        this.#list();
-      },
+      ({ dataset }) => this.#openKind(dataset.kind),
       "aria-selected",
     );
-    mark((tab) => tab.dataset.kind === this.#kind);
+    this.markKind((tab) => tab.dataset.kind === this.#kind);
+  }
+
+  #openKind(kind) {
+    this.#kind = kind;
+    this.markKind((tab) => tab.dataset.kind === kind);
+    this.#list();
+  }
+
+  // A search goes through all kinds, unless one is chosen meanwhile; after it the kind before is open again.
+  #search() {
+    const isSearching = this.find("search-library").value.trim() !== "";
+    if (isSearching === (this.#kindBefore !== null)) return this.#list();
+    const kind = isSearching ? ALL : this.#kind === ALL ? this.#kindBefore : this.#kind;
+    this.#kindBefore = isSearching ? this.#kind : null;
+    return this.#openKind(kind);
+  }
+
+  get #entries() {
+    return [
+      ...(this.saved?.entries ?? []).map(({ name, title }) => ({
+        value: `${SAVED} ${name}`,
+        title,
+        kind: SAVED,
+        label: title,
+      })),
+      ...this.library.materials.map(({ name, title, kind = "", source }) => ({
+        value: name,
+        title,
+        kind,
+        label: short(title),
+        hint: source ? `${title}. ${source}` : title,
+      })),
+    ];
   }
 
   // What the chosen kind and the words in the search leave of the library.
   #list() {
-    const words = this.find("search-library").value.trim().toLowerCase();
-    const presets = this.library.materials.filter(({ kind }) => [ALL, kind].includes(this.#kind));
-    this.find("forget-saved").hidden = this.#kind !== SAVED || !this.saved.entries.length;
-    const saved = [ALL, SAVED].includes(this.#kind) ? (this.saved?.entries ?? []) : [];
-    this.shown.fill(
-      [
-        ...saved.map(({ name, title }) => ({ value: `${SAVED} ${name}`, title, label: title })),
-        ...presets.map(({ name, title, kind, source }) => ({
-          value: name,
-          title,
-          kind,
-          label: short(title),
-          hint: source ? `${title}. ${source}` : title,
-        })),
-      ].filter(({ title, kind = "" }) => `${title} ${kind}`.toLowerCase().includes(words)),
-      (image, value) => {
-        const fetch = () => this.#fetch(value);
-        if (value.startsWith(`${SAVED} `)) this.thumbnails.later(image, fetch);
-        else this.thumbnails.preset(image, value, fetch);
-      },
+    const words = this.find("search-library").value.trim();
+    const found = this.#entries.filter(({ title, kind }) =>
+      `${title} ${kind === SAVED ? "" : kind}`.toLowerCase().includes(words.toLowerCase()),
     );
+    const shown = found.filter(({ kind }) => [ALL, kind].includes(this.#kind));
+    this.find("forget-saved").hidden = this.#kind !== SAVED || !this.saved.entries.length;
+    this.shown.fill(shown, (image, value) => {
+      const fetch = () => this.#fetch(value);
+      if (value.startsWith(`${SAVED} `)) this.thumbnails.later(image, fetch);
+      else this.thumbnails.preset(image, value, fetch);
+    });
+    if (this.#kindBefore === null) this.find("library").scrollLeft = this.#scrolls.get(this.#kind) ?? 0;
+    this.#tellNone(shown, found, words);
+  }
+
+  // Words in the place of a row without pictures.
+  #tellNone(shown, found, words) {
+    if (shown.length) return this.find("no-hit").replaceChildren();
+    const isElsewhere = words && found.length;
+    const text = words ? `Nothing ${isElsewhere ? "here " : ""}is called “${words}”.` : "Nothing is saved yet.";
+    const button = isElsewhere
+      ? element(
+          "button",
+          { type: "button", class: "button small", onclick: () => this.#openKind(ALL) },
+          `Show ${amount(found.length, "material")} of other kinds`,
+        )
+      : "";
+    return this.find("no-hit").replaceChildren(text, button);
   }
 
   // Saved materials have come or gone; the one that was saved just now gets another picture.
@@ -136,7 +178,7 @@ export class Shelf {
   async #assign(value) {
     try {
       this.acts.putMaterial(await this.#fetch(value), this.#titleOf(value));
-      this.used = value;
+      this.#origins.set(this.acts.material, value);
       this.shown.mark(value);
     } catch (problem) {
       this.acts.complain(problem);
@@ -173,8 +215,7 @@ export class Shelf {
       this.thumbnails.own(image, this.#carried(name), image.isWorn);
     }
     this.materials.mark(chosen.material);
-    if (this.used && this.#materials.get(this.used) !== scene.materials[chosen.material]) this.used = null;
-    this.shown.mark(this.used ?? null);
+    this.shown.mark(this.#origins.get(scene.materials[chosen.material]) ?? null);
     this.environments.fill(
       [
         { value: OWN, title: home.environment ? "The scene's own" : "The scene's own: none" },

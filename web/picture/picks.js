@@ -2,14 +2,21 @@
 
 import { ball, box, isFlat, together } from "../document/bounds.js";
 import { axes, ray } from "../document/camera.js";
+import { drawContour } from "../document/contour.js";
 import { isOn } from "../document/outline.js";
-import { Picker, drawOutline } from "../document/picking.js";
+import { Picker } from "../document/picking.js";
 import { inWords } from "../lib/format-text.js";
-import { at, pointer } from "../lib/patch.js";
+import { at, equal, pointer } from "../lib/patch.js";
 import { dot } from "../lib/vector.js";
 
 const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
 const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
+
+// Whether shapes are those that there were, be they of another material.
+const areInPlace = (shapes, before = []) =>
+  shapes === before ||
+  (shapes.length === before.length &&
+    shapes.every((shape, i) => shape === before[i] || equal({ ...shape, material: "" }, { ...before[i], material: "" })));
 
 export class Picks {
   #outlined = {}; // what the outline was drawn of: it stays while that is so
@@ -25,7 +32,7 @@ export class Picks {
   mark() {
     const { scene, chosen } = this.acts.state;
     const { camera, shapes, thing } = this.#outlined;
-    if (scene.camera !== camera || scene.shapes !== shapes || chosen.thing !== thing)
+    if (scene.camera !== camera || chosen.thing !== thing || !areInPlace(scene.shapes, shapes))
       this.find("outline").classList.remove("shown");
   }
 
@@ -54,7 +61,7 @@ export class Picks {
   }
 
   async #outline(scene, shape) {
-    drawOutline(
+    drawContour(
       this.find("outline"),
       await this.picker.layer("shape_id", scene),
       shape,

@@ -109,7 +109,7 @@ export class RenderList {
   // null, more(); formats() beside PNG and EXR; left(render), making(id), isMaking(id, format); paint(image, render).
   constructor(root, acts) {
     Object.assign(this, { root, acts });
-    this.list = element("ul", { class: "renders", "aria-label": "Renders" });
+    this.list = element("ul", { class: "renders", role: "list", "aria-label": "Renders" });
     this.empty = element("p", { class: "note" }, "Finished pictures are listed here, and renders under way.");
     this.older = element(
       "button",
@@ -152,7 +152,6 @@ export class RenderList {
     nodes.forEach((node, i) => {
       if (this.list.children[i] !== node) this.list.insertBefore(node, this.list.children[i] ?? null);
     });
-    this.list.hidden = !nodes.length;
     this.empty.hidden = nodes.length > 0;
     this.older.hidden = !hasMore;
   }
