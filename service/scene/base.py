@@ -70,6 +70,7 @@ def hint(
     new: dict[str, str] | None = None,
     known_as: str | None = None,
     asset: tuple[str, tuple[str, ...]] | None = None,
+    log: float | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -82,7 +83,7 @@ def hint(
     the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
     is what the editor begins an entry of a table with. `known_as` is the name that other models have for the
     parameter. `asset` is the kind of the file that a reference leads to, with the endings of such files' names, where
-    the editor lets choose one.
+    the editor lets choose one. `log` is where a slider begins that goes over decades; below it is only 0.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -122,6 +123,8 @@ def hint(
     if asset is not None:
         kind, endings = asset
         extra["x-asset"] = {"kind": kind, "endings": list(endings)}
+    if log is not None:
+        extra["x-log"] = log
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

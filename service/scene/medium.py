@@ -23,11 +23,25 @@ class Medium(Model):
 
     absorption: Annotated[
         Coefficient,
-        hint("Absorption", "The rate at which light is lost, per channel.", unit="1/m", widget="color", soft=10),
+        hint(
+            "Absorption",
+            "The rate at which light is lost, per channel.",
+            unit="1/m",
+            widget="color",
+            soft=1000,
+            log=0.01,
+        ),
     ] = (0.0, 0.0, 0.0)
     scattering: Annotated[
         Coefficient,
-        hint("Scattering", "The rate at which light turns, per channel.", unit="1/m", widget="color", soft=10),
+        hint(
+            "Scattering",
+            "The rate at which light turns, per channel.",
+            unit="1/m",
+            widget="color",
+            soft=1000,
+            log=0.01,
+        ),
     ] = (0.0, 0.0, 0.0)
     albedo: Annotated[
         Reflectance | None,
@@ -49,6 +63,7 @@ class Medium(Model):
             unit="m",
             widget="color",
             soft=1,
+            log=1e-5,
             absent="from absorption and scattering",
         ),
     ] = None

@@ -132,7 +132,7 @@ class HeightTexture(_Reference):
     channel: Annotated[Channel, hint("Channel", "Which of the texture's channels is read.")] = "r"
     scale: Annotated[
         Coordinate, hint("Relief", "How far white lies above black; below 0 white is deep.",
-                         unit="m", widget="slider", soft=(0, 0.1))
+                         unit="m", widget="slider", soft=(0, 0.1), log=1e-5)
     ] = 0.02  # fmt: skip
     midlevel: Annotated[
         Coordinate, hint("Midlevel", "The value of the texture that lies where the surface is.",

@@ -4,163 +4,15 @@
 
 import { hex, linear, measureWords, parseColor } from "../lib/color.js";
 import { element, isBeingEdited } from "../lib/dom.js";
-import { slideByTouch } from "../lib/sliding.js";
-import { neededIn, parseNumber, parseTriple } from "../lib/number.js";
-import { compact, inWords, unitText } from "../lib/format-text.js";
+import { parseTriple } from "../lib/number.js";
+import { compact, inWords, narrow, unitText } from "../lib/format-text.js";
 import { scrubBy } from "../lib/scrub.js";
-import { span } from "../lib/span.js";
+import { amount, amounts } from "./amounts.js";
+import { numberEntry, placeholder, slider, track, withUnit } from "./number-controls.js";
 
 const STOPS = 8; // below and above 1 of the unit: how far a slider of strengths goes at least
+const STOP = { unit: "", open: {}, soft: {}, step: 0.1 }; // a number of them
 const exact = (x) => Number(x.toPrecision(5));
-const UNSET = "–"; // neither document nor schema has a value
-const ROOM = { narrow: 7, wide: 20 }; // letters that a box shows of what holds where it is empty
-
-// What an empty box says of the value that holds: its word, where that has room.
-const placeholder = ({ absent = UNSET }, room) => (absent.length > ROOM[room] ? "auto" : absent);
-
-// A text field: one of type=number swallows what it does not understand, such as the comma of 0,35. Only where
-// a value is never negative may a phone show its keys for decimals: those have no minus.
-function numberEntry(field, id, { input, commit, refuse, restore }, room = "narrow") {
-  const unit = unitText(field.unit);
-  let latest = null;
-  let scale = span(field.soft, field.step, Boolean(field.ranges));
-  const clean = () => {
-    delete box.dataset.dirty;
-  };
-  const take = () => {
-    clean();
-    if (box.value.trim() === "") {
-      if (field.required) return restore();
-      input(undefined);
-      return commit();
-    }
-    const value = parseNumber(box.value, unit);
-    if (value === null) return refuse(neededIn(unit));
-    input(value);
-    commit();
-  };
-  const now = () =>
-    parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
-  const { min = -Infinity, max = Infinity, open } = field;
-  const give = (value) => {
-    const to = Number(value.toPrecision(12));
-    if (to < min || to > max || to <= open.min || to >= open.max) return;
-    clean();
-    input(to);
-    box.value = compact(to);
-  };
-  const step = (steps) => {
-    const from = now();
-    give(from + steps * scale.stepAt(from));
-    box.select();
-  };
-  let begun = null; // {latest, from}: where a drag of the label began
-  const drag = {
-    begin: () => {
-      begun = { latest, from: latest ?? now() };
-    },
-    move: (steps) => give(Math.min(Math.max(begun.from + steps * scale.stepAt(begun.from), min), max)),
-    end: commit,
-    cancel: () => {
-      input(begun.latest ?? undefined);
-      commit();
-    },
-  };
-  const box = element("input", {
-    type: "text",
-    id,
-    class: "entry number",
-    autocomplete: "off",
-    spellcheck: "false",
-    inputmode: field.min >= 0 ? "decimal" : undefined,
-    oninput: () => {
-      box.dataset.dirty = "yes";
-    },
-    onblur: clean,
-    onkeydown: (event) => {
-      if (event.key === "Escape") {
-        clean();
-        restore();
-      }
-      const up = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-      if (!up || event.altKey || event.ctrlKey || event.metaKey) return;
-      event.preventDefault();
-      step(up * (event.shiftKey ? 10 : 1));
-    },
-    onkeyup: ({ key }) => {
-      if (key === "ArrowUp" || key === "ArrowDown") commit();
-    },
-    onchange: take,
-  });
-  const show = (value, effective, ends = field.soft) => {
-    latest = value ?? null;
-    scale = span(ends, field.step, Boolean(field.ranges));
-    box.placeholder = effective === undefined ? placeholder(field, room) : compact(effective);
-    const holds = latest ?? effective;
-    if (typeof holds === "number") {
-      box.setAttribute("role", "spinbutton");
-      box.setAttribute("aria-valuenow", String(holds));
-      box.setAttribute("aria-valuetext", `${compact(holds)} ${unit}`.trim());
-    } else ["role", "aria-valuenow", "aria-valuetext"].forEach((name) => box.removeAttribute(name));
-    if (isBeingEdited(box)) return;
-    box.value = latest === null ? "" : compact(latest);
-    if (latest === null) box.title = effective === undefined ? (field.absent ?? "") : "";
-    else box.title = box.value === String(latest) ? "" : String(latest);
-  };
-  return { element: box, show, drag };
-}
-
-function track(field, id, { input, commit }) {
-  let scale = null;
-  // A bound that does not belong to the range: the slider stops one step before it.
-  const inside = (at) => {
-    const value = scale.isLog ? scale.fromShare(at) : at;
-    if (value <= field.open.min) return field.open.min + field.step;
-    return value >= field.open.max ? field.open.max - field.step : value;
-  };
-  const range = element("input", {
-    type: "range",
-    id,
-    oninput: () => input(inside(range.valueAsNumber)),
-    onchange: commit,
-  });
-  const over = (ends) => {
-    if (scale && ends.min === scale.min && ends.max === scale.max) return;
-    scale = span(ends, field.step, Boolean(field.ranges));
-    const [min, max] = scale.isLog ? [0, 1] : [ends.min, ends.max];
-    Object.assign(range, { min: String(min), max: String(max), step: String(scale.step) });
-  };
-  over(field.soft);
-  slideByTouch(range, { input: (value) => input(inside(value)), commit });
-  // A slider without a value stands, as a ghost, where the one is that holds; without either it has no thumb.
-  const show = (value, effective, ends = field.soft) => {
-    over(ends);
-    const [min, max] = [Number(range.min), Number(range.max)];
-    const known = value ?? effective ?? null;
-    range.classList.toggle("ghost", (value ?? null) === null);
-    range.classList.toggle("unset", known === null);
-    range.value = String(known === null ? min : scale.isLog ? scale.toShare(known) : known);
-    range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
-    const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
-    const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
-    range.setAttribute("aria-valuetext", words);
-  };
-  return { element: range, show };
-}
-
-function slider(field, id, events) {
-  const range = track(field, id, events);
-  const entry = numberEntry(field, `${id}-entry`, events);
-  entry.element.setAttribute("aria-label", `${field.title}, number`);
-  return {
-    element: element("div", { class: "slider" }, range.element, entry.element),
-    drag: entry.drag,
-    show(value, effective, ends) {
-      range.show(value, effective, ends);
-      entry.show(value, effective, ends);
-    },
-  };
-}
 
 function choice(field, id, { input, commit }) {
   const select = element("select", {
@@ -204,7 +56,9 @@ function vector(field, id, { input, commit, refuse, restore }) {
   const names = field.length === 2 ? ["U", "V"] : field.isPerChannel ? ["red", "green", "blue"] : ["X", "Y", "Z"];
   let latest = null;
   const entries = names.map((axis, i) => {
-    const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
+    const write = (x) => narrow(x, Math.max(...(latest ?? [0]).map(Math.abs)));
+    const own = { ...field, required: true, write, words: (x) => withUnit(field, x) };
+    const entry = numberEntry(own, i === 0 ? id : `${id}-${axis}`, {
       input: (value) => input(latest ? latest.map((x, k) => (k === i ? value : x)) : names.map(() => value)),
       commit,
       refuse,
@@ -235,13 +89,13 @@ function vector(field, id, { input, commit, refuse, restore }) {
 }
 
 // Of light: a slider over stops that reaches as far as the value, the stops over 1 of the unit, and the value itself.
-function strengthControl(field, id, events) {
+export function strengthControl(field, id, events) {
   const named = (title, more) => ({ ...field, title, ranges: true, initial: undefined, ...more });
   const title = `${field.title}, strength`;
   const ends = { min: 2 ** -STOPS, max: 2 ** STOPS };
   const range = track(named(title, { soft: ends }), `${id}-strength`, events);
   const stops = numberEntry(
-    named(title, { unit: "", min: undefined, max: undefined, open: {}, soft: {}, ranges: undefined, step: 0.1 }),
+    { ...STOP, title },
     `${id}-stops`,
     { ...events, input: (value) => events.input(value === undefined ? undefined : exact(2 ** value)) },
   );
@@ -384,7 +238,11 @@ function fileEntry(id, { pick }) {
 
 const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
 
+// A field may come with a way to make its own.
 export function control(field, id, events) {
+  if (field.make) return field.make(field, id, events);
+  if (field.widget === "amounts") return amounts(field, id, events);
+  if (field.widget === "amount") return amount(field, id, events);
   if (field.widget === "color") return color(field, id, events);
   if (field.widget === "strength") return strengthControl(field, id, events);
   if (field.widget === "vector") return vector(field, id, events);

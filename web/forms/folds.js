@@ -5,6 +5,7 @@ import { hex, linear } from "../lib/color.js";
 import { element } from "../lib/dom.js";
 import { compact, inWords } from "../lib/format-text.js";
 import { isObject } from "../lib/patch.js";
+import { amountWords } from "./amounts.js";
 
 const ORDER = ["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface", "Film", "Emission", "Geometry"];
 const MOST_WORDS = 3; // values that a head tells
@@ -12,14 +13,24 @@ const byHand = new Map(); // whether a fold was opened or shut by hand, by its n
 
 const place = (group) => (ORDER.indexOf(group) + 1 || ORDER.length + 1) - 1;
 
-// A value as the head of its fold has it.
-function words({ title, widget }, value, group) {
+// A value as the head of its fold has it: words and, of a colour, a swatch before them.
+function words(field, value, group) {
+  const { title, widget } = field;
   const short = title.replace(new RegExp(`^(${group}|clearcoat) `, "i"), "").toLowerCase();
-  if (value?.texture !== undefined) return `${short} ${value.texture}`;
-  if (isObject(value)) return short;
-  if (widget === "color") return `${short} ${hex(linear(value))}`;
-  if (typeof value === "boolean") return value ? short : `no ${short}`;
-  return `${short} ${typeof value === "string" ? inWords(value).toLowerCase() : compact(value)}`;
+  if (value?.texture !== undefined) return [`${short} ${value.texture}`];
+  if (widget === "color") return [swatch(value), short];
+  if (isObject(value)) return [short];
+  if (["amount", "amounts"].includes(widget)) return [`${short} ${amountWords(field, value)}`];
+  if (typeof value === "boolean") return [value ? short : `no ${short}`];
+  return [`${short} ${typeof value === "string" ? inWords(value).toLowerCase() : compact(value)}`];
+}
+
+function swatch(value) {
+  const now = linear(value);
+  const most = Math.max(1, ...now);
+  const dot = element("i", { class: "swatch" });
+  dot.style.setProperty("background", hex(now.map((x) => x / most)));
+  return dot;
 }
 
 // `rows`: Map of a field's name to {element, isChanged}; `fields` those of the schema.
@@ -70,9 +81,13 @@ export function folds(rows, fields) {
     show(values) {
       for (const { group, own, told, node } of parts) {
         const changed = own.filter(({ name }) => rows.get(name).isChanged());
-        const texts = changed.slice(0, MOST_WORDS).map((field) => words(field, values[field.name], group));
-        const text = [...texts, ...(changed.length > MOST_WORDS ? ["…"] : [])].join(", ");
-        if (told.textContent !== text) told.textContent = text;
+        const first = changed.slice(0, MOST_WORDS);
+        const now = JSON.stringify([changed.length, first.map(({ name }) => [name, values[name]])]);
+        if (told.dataset.now !== now) {
+          const parts = first.flatMap((field, i) => [...(i ? [", "] : []), ...words(field, values[field.name], group)]);
+          told.replaceChildren(...parts, ...(changed.length > MOST_WORDS ? [", …"] : []));
+          told.dataset.now = now;
+        }
         node.classList.toggle("changed", changed.length > 0);
       }
       if (!isMade) sift();

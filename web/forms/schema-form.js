@@ -2,6 +2,7 @@
 // default and a button that goes back to it.
 
 import { linear } from "../lib/color.js";
+import { isLength } from "./amounts.js";
 import { control } from "./controls.js";
 import { element, freshId } from "../lib/dom.js";
 import { folds } from "./folds.js";
@@ -14,7 +15,7 @@ import { describe } from "../lib/tooltip.js";
 import { unitText } from "../lib/format-text.js";
 
 const isSame = ({ widget }, a, b) =>
-  widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+  ["color", "amounts"].includes(widget) && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
 
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 
@@ -57,7 +58,7 @@ function row(field, { change, commit, forgive, takeFile, pickFile, slot, beneath
     },
   });
   const label = element("label", { for: id }, field.title);
-  if (field.unit) {
+  if (field.unit && !isLength(field)) {
     const unit = unitText(field.unit);
     label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit", "aria-hidden": "true" }, unit)); // said with the value
   }

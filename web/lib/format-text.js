@@ -40,6 +40,18 @@ export const compact = (value) =>
     .map((each) => String(Number(each.toPrecision(4))))
     .join(", ");
 
+const NARROW = 7; // letters that a field of three beside each other shows
+
+// A number of several whose greatest is `most`, as short as such a field needs it; what is left of a rounding is 0.
+export function narrow(value, most) {
+  if (Math.abs(value) < 1e-6 * most) return "0";
+  const texts = [
+    ...[4, 3].map((digits) => String(Number(value.toPrecision(digits)))),
+    ...[2, 1].map((digits) => value.toExponential(digits)),
+  ];
+  return texts.find((text) => text.length <= NARROW) ?? texts.at(-1);
+}
+
 export function duration(seconds) {
   if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
   if (seconds < 99.5) return `${Math.round(seconds)} s`;

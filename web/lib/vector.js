@@ -9,8 +9,13 @@ export const length = (a) => Math.hypot(...a);
 export const normalize = (a) => scale(a, 1 / length(a));
 export const mix = (a, b, t) => a.map((x, i) => x + (b[i] - x) * t);
 
-// Seven digits: what float32 keeps, and what a document can be read with.
-export const tidy = (a) => a.map((x) => Number(x.toPrecision(7)));
+const DUST = 1e-9; // of the greatest: what sines and sums leave of a 0
+
+// Seven digits: what float32 keeps, and what a document can be read with. The rest of a rounding is 0.
+export const tidy = (a) => {
+  const least = DUST * Math.max(...a.map(Math.abs));
+  return a.map((x) => (Math.abs(x) < least ? 0 : Number(x.toPrecision(7))));
+};
 
 // v turned about the unit axis [Rodrigues].
 export function turn(v, axis, angle) {

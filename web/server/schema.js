@@ -110,7 +110,8 @@ function field(schema, name, raw, required) {
             : reference
               ? "texture"
               : null;
-  const widget = file ? "file" : usual;
+  const log = bound(nodes, "x-log");
+  const widget = file ? "file" : log ? (color ? "amounts" : "amount") : usual;
   if (!widget || bound(nodes, "const") !== undefined) return null;
   return {
     name,
@@ -128,7 +129,8 @@ function field(schema, name, raw, required) {
     group: bound(nodes, "x-group"),
     hint: bound(nodes, "description") ?? "",
     unit: bound(nodes, "x-unit") ?? "",
-    soft,
+    soft: log && soft.min === open.min ? { ...soft, min: log } : soft,
+    log,
     step: step(soft.min, soft.max, whole && !color),
     whole,
     initial: top.default ?? undefined,

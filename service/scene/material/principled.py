@@ -40,6 +40,16 @@ class PrincipledMaterial(DisneyMaterial):
     """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
 
     type: Literal["principled"]  # type: ignore[assignment]
+    subsurface: Annotated[
+        AnyFraction,
+        hint(
+            "Subsurface",
+            "Share of the diffuse light that comes out beside where it went in; without a radius a flatter shade.",
+            group="Subsurface",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
     subsurface_radius: WalkRadius = None
     transmission: Annotated[
         AnyFraction,
@@ -96,6 +106,7 @@ class PrincipledMaterial(DisneyMaterial):
             unit="m",
             widget="slider",
             soft=5,
+            log=1e-4,
             absent="clear",
         ),
     ] = None

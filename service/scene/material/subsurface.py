@@ -24,6 +24,7 @@ WalkRadius = Annotated[
         unit="m",
         widget="color",
         soft=1,
+        log=1e-5,
         absent="flat",
     ),
 ]
@@ -36,6 +37,7 @@ Depth = Annotated[
         unit="m",
         widget="slider",
         soft=1,
+        log=1e-5,
     ),
 ]
 Scatter = Annotated[
@@ -82,6 +84,7 @@ Radius = Annotated[
         unit="m",
         widget="slider",
         soft=1,
+        log=1e-5,
     ),
 ]
 RadiusScale = Annotated[

@@ -50,10 +50,19 @@ const compact=(value)=>
 .flat()
 .map((each)=>String(Number(each.toPrecision(4))))
 .join(", ");
+const NARROW=7;
+function narrow(value,most){
+if(Math.abs(value)<1e-6 * most)return "0";
+const texts=[
+...[4,3].map((digits)=>String(Number(value.toPrecision(digits)))),
+...[2,1].map((digits)=>value.toExponential(digits)),
+];
+return texts.find((text)=>text.length<=NARROW)?? texts.at(-1);
+}
 const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0%`;
 const amount = (n, thing) => `${count(n)} ${thing}${n === 1 ? "" : "s"}`;
 const count=(n)=>n.toLocaleString("en").replaceAll(",","\u202f");
-return { amount, compact, count, inWords, percent, unitText };
+return { amount, compact, count, inWords, narrow, percent, unitText };
 })();
 const lib_patch = (() => {
 const isObject=(value)=>value !==null&&typeof value==="object"&&!Array.isArray(value);
@@ -167,7 +176,8 @@ const usual=color
 :reference
 ? "texture"
 :null;
-const widget=file ? "file":usual;
+const log=bound(nodes,"x-log");
+const widget=file ? "file":log ?(color ? "amounts":"amount"):usual;
 if(!widget||bound(nodes,"const")!==undefined)return null;
 return{
 name,
@@ -185,7 +195,8 @@ title:top.title ?? name,
 group:bound(nodes,"x-group"),
 hint:bound(nodes,"description")?? "",
 unit:bound(nodes,"x-unit")?? "",
-soft,
+soft:log&&soft.min===open.min ?{...soft,min:log}:soft,
+log,
 step:step(soft.min,soft.max,whole&&!color),
 whole,
 initial:top.default ?? undefined,
@@ -281,60 +292,6 @@ Math.round(255 * toSrgb(Math.min(Math.max(x,0),1)))
 .join("");
 return { HEX, hex, linear, measureWords, parseColor, toLinear, toSrgb };
 })();
-const lib_sliding = (() => {
-const STILL=6;
-const GLIDE_MS=100;
-let scrolled=-Infinity;
-document.addEventListener(
-"scroll",
-()=>{
-scrolled=performance.now();
-},
-{capture:true,passive:true},
-);
-function slideByTouch(range,{input,commit}){
-let finger=null;
-const set=(from,pixels)=>{
-const [min,max]=[Number(range.min),Number(range.max)];
-range.value = String(from + (pixels / range.clientWidth) * (max - min));
-input(range.valueAsNumber);
-};
-range.addEventListener(
-"input",
-(event)=>{
-if(!finger)return;
-event.stopImmediatePropagation();
-range.value=String(finger.value);
-},
-{capture:true},
-);
-range.addEventListener("pointerdown",({pointerType,pointerId:id,clientX:x,clientY:y})=>{
-if(pointerType !=="touch"||finger)return;
-const value=range.valueAsNumber;
-finger={id,x,y,from:value,value,isSliding:false,isTap:performance.now()- scrolled>GLIDE_MS};
-});
-range.addEventListener("pointermove",({pointerId,clientX,clientY})=>{
-if(pointerId !==finger?.id)return;
-const [right,down]=[Math.abs(clientX - finger.x),Math.abs(clientY - finger.y)];
-if(right>STILL||down>STILL)finger.isTap=false;
-if(!finger.isSliding&&right>STILL&&right>down)Object.assign(finger,{isSliding:true,x:clientX});
-if(!finger.isSliding)return;
-set(finger.from,clientX - finger.x);
-finger.value=range.valueAsNumber;
-});
-const lift=({pointerId,type})=>{
-if(pointerId !==finger?.id)return;
-const{x,isSliding,isTap}=finger;
-finger=null;
-const isTapped=isTap&&type==="pointerup";
-if(isTapped)set(Number(range.min),x - range.getBoundingClientRect().left);
-if(isTapped||isSliding)commit();
-};
-range.addEventListener("pointerup",lift);
-range.addEventListener("pointercancel",lift);
-}
-return { slideByTouch };
-})();
 const lib_number = (() => {
 const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?:\s*([^\s\d.+*/()-]+))?|([-+*/()]))/giy;
 const UNITS={
@@ -396,6 +353,381 @@ const NEEDED = "A number is needed here, such as 0.5, 0,5, 1/3 or 50%.";
 const neededIn = (unit) => (unit ? `A number is needed here, in ${unit}, such as 0.5, 0,5 or 1/3.` : NEEDED);
 return { NEEDED, neededIn, parseNumber, parseTriple };
 })();
+const lib_lengths = (() => {
+const { parseNumber } = lib_number;
+const UNITS=[
+{from:1,unit:"m",metres:1},
+{from:0.1,unit:"cm",metres:0.01},
+{from:1e-5,unit:"mm",metres:0.001},
+{from:0,unit:"µm",metres:1e-6},
+];
+const USUAL=UNITS[2];
+const unitFor=(length)=>(length ? UNITS.find(({from})=>Math.abs(length)>=from *(1 - 1e-9)):USUAL);
+const LENGTH_NEEDED = "A length is needed here, such as 26 mm, 2.5 cm or 1/8 in.";
+function lengthWords(length){
+const{unit,metres}=unitFor(length);
+return `${Number((length / metres).toPrecision(3))} ${unit}`;
+}
+const LAST = /^([^a-zµ]*)([a-zµ]+)$/i;
+function parseLength(text,before=null){
+const plain=text.trim();
+const [,sum,unit]=LAST.exec(plain)?? [];
+if (!unit && /[a-zµ]/i.test(plain)) return parseNumber(plain, "m");
+const metres = unit ? parseNumber(`1 ${unit}`, "m") : unitFor(before).metres;
+const value=parseNumber(sum ?? plain,"1");
+return value===null||metres===null ? null:Number((value * metres).toPrecision(12));
+}
+return { LENGTH_NEEDED, lengthWords, parseLength };
+})();
+const lib_sliding = (() => {
+const STILL=6;
+const GLIDE_MS=100;
+let scrolled=-Infinity;
+document.addEventListener(
+"scroll",
+()=>{
+scrolled=performance.now();
+},
+{capture:true,passive:true},
+);
+function slideByTouch(range,{input,commit}){
+let finger=null;
+const set=(from,pixels)=>{
+const [min,max]=[Number(range.min),Number(range.max)];
+range.value = String(from + (pixels / range.clientWidth) * (max - min));
+input(range.valueAsNumber);
+};
+range.addEventListener(
+"input",
+(event)=>{
+if(!finger)return;
+event.stopImmediatePropagation();
+range.value=String(finger.value);
+},
+{capture:true},
+);
+range.addEventListener("pointerdown",({pointerType,pointerId:id,clientX:x,clientY:y})=>{
+if(pointerType !=="touch"||finger)return;
+const value=range.valueAsNumber;
+finger={id,x,y,from:value,value,isSliding:false,isTap:performance.now()- scrolled>GLIDE_MS};
+});
+range.addEventListener("pointermove",({pointerId,clientX,clientY})=>{
+if(pointerId !==finger?.id)return;
+const [right,down]=[Math.abs(clientX - finger.x),Math.abs(clientY - finger.y)];
+if(right>STILL||down>STILL)finger.isTap=false;
+if(!finger.isSliding&&right>STILL&&right>down)Object.assign(finger,{isSliding:true,x:clientX});
+if(!finger.isSliding)return;
+set(finger.from,clientX - finger.x);
+finger.value=range.valueAsNumber;
+});
+const lift=({pointerId,type})=>{
+if(pointerId !==finger?.id)return;
+const{x,isSliding,isTap}=finger;
+finger=null;
+const isTapped=isTap&&type==="pointerup";
+if(isTapped)set(Number(range.min),x - range.getBoundingClientRect().left);
+if(isTapped||isSliding)commit();
+};
+range.addEventListener("pointerup",lift);
+range.addEventListener("pointercancel",lift);
+}
+return { slideByTouch };
+})();
+const lib_span = (() => {
+const FAR=90;
+const STEPS=1000;
+const DIGITS=3;
+const ZERO=0.03;
+function span({min,max},step,mayBeLog,log){
+if(log>0&&min<=log)return decades({min,max},log);
+const isLog=mayBeLog&&(min>0 ? max>FAR * min:min===0&&max>FAR);
+if(!isLog)return{min,max,isLog,step,stepAt:()=>step};
+const [low, range] = min > 0 ? [Math.log(min), Math.log(max / min)] : [0, Math.log1p(max)];
+const inside=(value)=>Math.min(Math.max(value,min),max);
+return{
+min,
+max,
+isLog,
+step: 1 / STEPS,
+toShare: (value) => ((min > 0 ? Math.log(inside(value)) : Math.log1p(inside(value))) - low) / range,
+fromShare:(share)=>
+inside(Number((min>0 ? Math.exp(low + share * range):Math.expm1(share * range)).toPrecision(DIGITS))),
+stepAt:(value)=>tenth(Math.max(Math.abs(value),min,1e-3)),
+};
+}
+const tenth=(value)=>10 **(Math.floor(Math.log10(value)+ 1e-9)- 1);
+function decades({min,max},log){
+const zero=min<log ? ZERO:0;
+const low=zero ? log:min;
+const range = Math.log(max / low);
+const inside=(value)=>Math.min(Math.max(value,low),max);
+return{
+min,
+max,
+isLog:true,
+step: 1 / STEPS,
+toShare: (value) => (zero && value < low / 2 ? 0 : zero + ((1 - zero) * Math.log(inside(value) / low)) / range),
+fromShare:(share)=>
+share < zero / 2
+? min
+: inside(Number((low * Math.exp((Math.max(0, share - zero) / (1 - zero)) * range)).toPrecision(DIGITS))),
+stepAt:(value)=>tenth(Math.max(Math.abs(value),low)),
+};
+}
+function endsOf({ranges,soft},choice){
+const own=ranges?.bounds[choice];
+return own ?{min:own[0],max:own[1]}:soft;
+}
+return { endsOf, span };
+})();
+const forms_number_controls = (() => {
+const { element, isBeingEdited } = lib_dom;
+const { slideByTouch } = lib_sliding;
+const { neededIn, parseNumber } = lib_number;
+const { compact, unitText } = lib_format_text;
+const { span } = lib_span;
+const UNSET="–";
+const ROOM={narrow:7,wide:20};
+const placeholder=({absent=UNSET},room)=>(absent.length>ROOM[room] ? "auto":absent);
+const withUnit = (field, value) => `${compact(value)} ${unitText(field.unit)}`.trim();
+const wordsOf=(field)=>field.words ?? field.write ??((value)=>withUnit(field,value));
+const scaleOf=(field,ends=field.soft)=>span(ends,field.step,Boolean(field.ranges),field.log);
+function numberEntry(field,id,{input,commit,refuse,restore},room="narrow"){
+const unit=unitText(field.unit);
+const{write=compact,read=(text)=>parseNumber(text,unit),needed=neededIn(unit)}=field;
+const words=wordsOf(field);
+let latest=null;
+let holds=null;
+let scale=scaleOf(field);
+const clean=()=>{
+delete box.dataset.dirty;
+};
+const take=()=>{
+clean();
+if(box.value.trim()===""){
+if(field.required)return restore();
+input(undefined);
+return commit();
+}
+const value=read(box.value,holds);
+if(value===null)return refuse(needed);
+input(value);
+commit();
+};
+const now=()=>
+[read(box.value,holds),latest,read(box.placeholder,holds),field.initial,field.soft.min,0].find(
+(each)=>typeof each==="number",
+);
+const{min=-Infinity,max=Infinity,open}=field;
+const give=(value)=>{
+const to=Number(value.toPrecision(12));
+if(to<min||to>max||to<=open.min||to>=open.max)return;
+clean();
+input(to);
+box.value=write(to);
+};
+const step=(steps)=>{
+const from=now();
+give(from + steps * scale.stepAt(from));
+box.select();
+};
+let begun=null;
+const drag={
+begin:()=>{
+begun={latest,from:latest ?? now()};
+},
+move:(steps)=>{
+const size=scale.stepAt(begun.from);
+const to = Math.round(begun.from / size + steps) * size;
+give(Math.min(Math.max(to,min),max));
+},
+end:commit,
+cancel:()=>{
+input(begun.latest ?? undefined);
+commit();
+},
+};
+const box=element("input",{
+type:"text",
+id,
+class:"entry number",
+autocomplete:"off",
+spellcheck:"false",
+inputmode:field.min>=0&&!field.write ? "decimal":undefined,
+oninput:()=>{
+box.dataset.dirty="yes";
+},
+onblur:clean,
+onkeydown:(event)=>{
+if(event.key==="Escape"){
+clean();
+restore();
+}
+const up={ArrowUp:1,ArrowDown:-1}[event.key];
+if(!up||event.altKey||event.ctrlKey||event.metaKey)return;
+event.preventDefault();
+step(up *(event.shiftKey ? 10:1));
+},
+onkeyup:({key})=>{
+if(key==="ArrowUp"||key==="ArrowDown")commit();
+},
+onchange:take,
+});
+const show=(value,effective,ends=field.soft)=>{
+latest=value ?? null;
+scale=scaleOf(field,ends);
+box.placeholder=effective===undefined ? placeholder(field,room):write(effective);
+holds=latest ?? effective ?? null;
+if(typeof holds==="number"){
+box.setAttribute("role","spinbutton");
+box.setAttribute("aria-valuenow",String(holds));
+box.setAttribute("aria-valuetext",words(holds));
+}else ["role","aria-valuenow","aria-valuetext"].forEach((name)=>box.removeAttribute(name));
+if(isBeingEdited(box))return;
+box.value=latest===null ? "":write(latest);
+if(latest===null)box.title=effective===undefined ?(field.absent ?? ""):"";
+else box.title=box.value===String(latest)? "":String(latest);
+};
+return{element:box,show,drag};
+}
+function track(field,id,{input,commit}){
+let scale=null;
+const inside=(at)=>{
+const value=scale.isLog ? scale.fromShare(at):at;
+if(value<=field.open.min)return field.open.min + field.step;
+return value>=field.open.max ? field.open.max - field.step:value;
+};
+const words=wordsOf(field);
+const range=element("input",{
+type:"range",
+id,
+oninput:()=>input(inside(range.valueAsNumber)),
+onchange:commit,
+});
+const over=(ends)=>{
+if(scale&&ends.min===scale.min&&ends.max===scale.max)return;
+scale=scaleOf(field,ends);
+const [min,max]=scale.isLog ? [0,1]:[ends.min,ends.max];
+Object.assign(range,{min:String(min),max:String(max),step:String(scale.step)});
+};
+over(field.soft);
+slideByTouch(range,{input:(value)=>input(inside(value)),commit});
+const show=(value,effective,ends=field.soft)=>{
+over(ends);
+const [min,max]=[Number(range.min),Number(range.max)];
+const known=value ?? effective ?? null;
+range.classList.toggle("ghost",(value ?? null)===null);
+range.classList.toggle("unset",known===null);
+range.value=String(known===null ? min:scale.isLog ? scale.toShare(known):known);
+range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
+const number=known===null ?(field.absent ?? ""):words(known);
+const told=(value ?? null)!==null ? number:["not set",number].filter(Boolean).join(", ");
+range.setAttribute("aria-valuetext",told);
+};
+return{element:range,show};
+}
+function slider(field,id,events){
+const range=track(field,id,events);
+const entry = numberEntry(field, `${id}-entry`, events);
+entry.element.setAttribute("aria-label", `${field.title}, number`);
+return{
+element:element("div",{class:"slider"},range.element,entry.element),
+drag:entry.drag,
+show(value,effective,ends){
+range.show(value,effective,ends);
+entry.show(value,effective,ends);
+},
+};
+}
+return { UNSET, numberEntry, placeholder, scaleOf, slider, track, withUnit };
+})();
+const forms_amounts = (() => {
+const { linear } = lib_color;
+const { element } = lib_dom;
+const { compact, unitText } = lib_format_text;
+const { LENGTH_NEEDED, lengthWords, parseLength } = lib_lengths;
+const { slider } = forms_number_controls;
+const CHANNELS=["Red","Green","Blue"];
+const SHARE={unit:"",min:0,max:1,soft:{min:0,max:1},open:{},step:0.01,initial:undefined};
+const exact=(x)=>Number(x.toPrecision(4));
+const inPercent={
+write: (share) => `${Number((100 * share).toPrecision(3))}\u00a0%`,
+read:(text)=>parseShare(text),
+needed:"A share is needed here, such as 40 %.",
+};
+function parseShare(text){
+const value = Number(text.replace(/\s*%\s*$/, "").replace(",", "."));
+return text.trim() && value >= 0 && value <= 100 ? value / 100 : null;
+}
+const isLength=({widget,unit})=>["amount","amounts"].includes(widget)&&unit==="m";
+const amountWords=(field,value)=>{
+const most=Math.max(...linear(value));
+return field.unit === "m" ? lengthWords(most) : `${compact(most)} ${unitText(field.unit)}`.trim();
+};
+const worded=(field)=>
+field.unit==="m" ?{...field,write:lengthWords,read:parseLength,needed:LENGTH_NEEDED}:field;
+function reaching(field,id,events){
+const own=slider(worded(field),id,events);
+const ends={...field.soft};
+own.element.classList.add("amount");
+return{
+...own,
+show(value,effective){
+for(const each of [value,effective])
+if(each>0)Object.assign(ends,{min:Math.min(ends.min,each),max:Math.max(ends.max,each)});
+own.show(value,effective,{...ends});
+},
+};
+}
+const amount=reaching;
+function amounts(field,id,events){
+let most=0;
+let shares=[1,1,1];
+const give=()=>events.input(shares.map((share)=>exact(most * share)));
+const whole=reaching({...field,soft:{...field.soft,min:field.log}},id,{
+...events,
+input(value){
+if(value===undefined)return events.input(undefined);
+most=value;
+give();
+},
+});
+const channels=CHANNELS.map((name,i)=>{
+const own = slider({ ...SHARE, ...inPercent, title: `${field.title}, ${name.toLowerCase()}` }, `${id}-${name}`, {
+...events,
+input(value){
+shares=shares.map((share,k)=>(k===i ?(value ?? 0):share));
+give();
+},
+});
+own.element
+.querySelector("[type=range]")
+.setAttribute("aria-label", `${field.title}, ${name.toLowerCase()}, share of the greatest`);
+return{name,...own};
+});
+const rows=element(
+"div",
+{class:"shares"},
+...channels.map(({name,element:own})=>
+element("div",{class:"share","data-axis":name.toLowerCase()},element("span",{},name),own),
+),
+);
+return{
+element:element("div",{class:"amounts"},whole.element,rows),
+drag:whole.drag,
+show(value,effective){
+const isSet=(value ?? null)!==null;
+rows.hidden=!isSet;
+const now=linear(value ?? 0);
+most=Math.max(...now);
+if (most > 0) shares = now.map((each) => each / most);
+whole.show(isSet ? most:value,effective);
+channels.forEach((each,i)=>each.show(exact(shares[i])));
+},
+};
+}
+return { amount, amountWords, amounts, isLength, worded };
+})();
 const lib_scrub = (() => {
 const STILL=3;
 const PACE=2;
@@ -444,178 +776,17 @@ return label;
 }
 return { scrubBy };
 })();
-const lib_span = (() => {
-const FAR=90;
-const STEPS=1000;
-const DIGITS=3;
-function span({min,max},step,mayBeLog){
-const isLog=mayBeLog&&(min>0 ? max>FAR * min:min===0&&max>FAR);
-if(!isLog)return{min,max,isLog,step,stepAt:()=>step};
-const [low, range] = min > 0 ? [Math.log(min), Math.log(max / min)] : [0, Math.log1p(max)];
-const inside=(value)=>Math.min(Math.max(value,min),max);
-return{
-min,
-max,
-isLog,
-step: 1 / STEPS,
-toShare: (value) => ((min > 0 ? Math.log(inside(value)) : Math.log1p(inside(value))) - low) / range,
-fromShare:(share)=>
-inside(Number((min>0 ? Math.exp(low + share * range):Math.expm1(share * range)).toPrecision(DIGITS))),
-stepAt:(value)=>10 **(Math.floor(Math.log10(Math.max(Math.abs(value),min,1e-3))+ 1e-9)- 1),
-};
-}
-function endsOf({ranges,soft},choice){
-const own=ranges?.bounds[choice];
-return own ?{min:own[0],max:own[1]}:soft;
-}
-return { endsOf, span };
-})();
 const forms_controls = (() => {
 const { hex, linear, measureWords, parseColor } = lib_color;
 const { element, isBeingEdited } = lib_dom;
-const { slideByTouch } = lib_sliding;
-const { neededIn, parseNumber, parseTriple } = lib_number;
-const { compact, inWords, unitText } = lib_format_text;
+const { parseTriple } = lib_number;
+const { compact, inWords, narrow, unitText } = lib_format_text;
 const { scrubBy } = lib_scrub;
-const { span } = lib_span;
+const { amount, amounts } = forms_amounts;
+const { numberEntry, placeholder, slider, track, withUnit } = forms_number_controls;
 const STOPS=8;
+const STOP={unit:"",open:{},soft:{},step:0.1};
 const exact=(x)=>Number(x.toPrecision(5));
-const UNSET="–";
-function numberEntry(field,id,{input,commit,refuse,restore}){
-const unit=unitText(field.unit);
-let latest=null;
-let scale=span(field.soft,field.step,Boolean(field.ranges));
-const clean=()=>{
-delete box.dataset.dirty;
-};
-const take=()=>{
-clean();
-if(box.value.trim()===""){
-if(field.required)return restore();
-input(undefined);
-return commit();
-}
-const value=parseNumber(box.value,unit);
-if(value===null)return refuse(neededIn(unit));
-input(value);
-commit();
-};
-const now=()=>
-parseNumber(box.value,unit)?? latest ?? parseNumber(box.placeholder)?? field.initial ?? field.soft.min ?? 0;
-const{min=-Infinity,max=Infinity,open}=field;
-const give=(value)=>{
-const to=Number(value.toPrecision(12));
-if(to<min||to>max||to<=open.min||to>=open.max)return;
-clean();
-input(to);
-box.value=compact(to);
-};
-const step=(steps)=>{
-const from=now();
-give(from + steps * scale.stepAt(from));
-box.select();
-};
-let begun=null;
-const drag={
-begin:()=>{
-begun={latest,from:latest ?? now()};
-},
-move:(steps)=>give(Math.min(Math.max(begun.from + steps * scale.stepAt(begun.from),min),max)),
-end:commit,
-cancel:()=>{
-input(begun.latest ?? undefined);
-commit();
-},
-};
-const box=element("input",{
-type:"text",
-id,
-class:"entry number",
-autocomplete:"off",
-spellcheck:"false",
-inputmode:field.min>=0 ? "decimal":undefined,
-oninput:()=>{
-box.dataset.dirty="yes";
-},
-onblur:clean,
-onkeydown:(event)=>{
-if(event.key==="Escape"){
-clean();
-restore();
-}
-const up={ArrowUp:1,ArrowDown:-1}[event.key];
-if(!up||event.altKey||event.ctrlKey||event.metaKey)return;
-event.preventDefault();
-step(up *(event.shiftKey ? 10:1));
-},
-onkeyup:({key})=>{
-if(key==="ArrowUp"||key==="ArrowDown")commit();
-},
-onchange:take,
-});
-const show=(value,effective,ends=field.soft)=>{
-latest=value ?? null;
-scale=span(ends,field.step,Boolean(field.ranges));
-box.placeholder=effective===undefined ?(field.absent ?? UNSET):compact(effective);
-const holds=latest ?? effective;
-if(typeof holds==="number"){
-box.setAttribute("role","spinbutton");
-box.setAttribute("aria-valuenow",String(holds));
-}else ["role","aria-valuenow"].forEach((name)=>box.removeAttribute(name));
-if(isBeingEdited(box))return;
-box.value=latest===null ? "":compact(latest);
-box.title=latest===null||box.value===String(latest)? "":String(latest);
-};
-return{element:box,show,drag};
-}
-function track(field,id,{input,commit}){
-let scale=null;
-const inside=(at)=>{
-const value=scale.isLog ? scale.fromShare(at):at;
-if(value<=field.open.min)return field.open.min + field.step;
-return value>=field.open.max ? field.open.max - field.step:value;
-};
-const range=element("input",{
-type:"range",
-id,
-oninput:()=>input(inside(range.valueAsNumber)),
-onchange:commit,
-});
-const over=(ends)=>{
-if(scale&&ends.min===scale.min&&ends.max===scale.max)return;
-scale=span(ends,field.step,Boolean(field.ranges));
-const [min,max]=scale.isLog ? [0,1]:[ends.min,ends.max];
-Object.assign(range,{min:String(min),max:String(max),step:String(scale.step)});
-};
-over(field.soft);
-slideByTouch(range,{input:(value)=>input(inside(value)),commit});
-const show=(value,effective,ends=field.soft)=>{
-over(ends);
-const [min,max]=[Number(range.min),Number(range.max)];
-const known=value ?? effective ?? null;
-range.classList.toggle("ghost",(value ?? null)===null);
-range.classList.toggle("unset",known===null);
-range.value=String(known===null ? min:scale.isLog ? scale.toShare(known):known);
-range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
-const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
-const words=(value ?? null)!==null ? number:["not set",number].filter(Boolean).join(", ");
-range.setAttribute("aria-valuetext",words);
-};
-return{element:range,show};
-}
-function slider(field,id,events){
-const range=track(field,id,events);
-const entry = numberEntry(field, `${id}-entry`, events);
-entry.element.setAttribute("aria-label", `${field.title}, number`);
-return{
-element:element("div",{class:"slider"},range.element,entry.element),
-drag:entry.drag,
-show(value,effective,ends){
-range.show(value,effective,ends);
-entry.show(value,effective,ends);
-},
-};
-}
 function choice(field,id,{input,commit}){
 const select=element("select",{
 id,
@@ -654,7 +825,9 @@ function vector(field,id,{input,commit,refuse,restore}){
 const names=field.length===2 ? ["U","V"]:field.isPerChannel ? ["red","green","blue"]:["X","Y","Z"];
 let latest=null;
 const entries=names.map((axis,i)=>{
-const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
+const write=(x)=>narrow(x,Math.max(...(latest ?? [0]).map(Math.abs)));
+const own={...field,required:true,write,words:(x)=>withUnit(field,x)};
+const entry = numberEntry(own, i === 0 ? id : `${id}-${axis}`, {
 input:(value)=>input(latest ? latest.map((x,k)=>(k===i ? value:x)):names.map(()=>value)),
 commit,
 refuse,
@@ -689,7 +862,7 @@ const title = `${field.title}, strength`;
 const ends={min:2 ** -STOPS,max:2 ** STOPS};
 const range = track(named(title, { soft: ends }), `${id}-strength`, events);
 const stops=numberEntry(
-named(title,{unit:"",min:undefined,max:undefined,open:{},soft:{},ranges:undefined,step:0.1}),
+{...STOP,title},
 `${id}-stops`,
 {...events,input:(value)=>events.input(value===undefined ? undefined:exact(2 ** value))},
 );
@@ -740,7 +913,8 @@ class:"entry",
 spellcheck:"false",
 autocomplete:"off",
 "aria-label": `${field.title}, #rrggbb or three linear numbers`,
-placeholder:field.absent ?? UNSET,
+placeholder:placeholder(field,"wide"),
+title:field.absent,
 oninput:()=>{
 text.dataset.dirty="yes";
 },
@@ -823,6 +997,9 @@ button.textContent=value ? "Another file…":"Choose a file…";
 }
 const bounded=({soft})=>Number.isFinite(soft.max - soft.min);
 function control(field,id,events){
+if(field.make)return field.make(field,id,events);
+if(field.widget==="amounts")return amounts(field,id,events);
+if(field.widget==="amount")return amount(field,id,events);
 if(field.widget==="color")return color(field,id,events);
 if(field.widget==="strength")return strengthControl(field,id,events);
 if(field.widget==="vector")return vector(field,id,events);
@@ -830,27 +1007,37 @@ if(field.widget==="texture")return{element:element("span",{id}),show(){}};
 if(field.widget==="file")return fileEntry(id,events);
 if(field.widget==="choice")return choice(field,id,events);
 if(field.widget==="toggle")return toggle(field,id,events);
-if(field.widget==="number"||!bounded(field))return numberEntry(field,id,events);
+if(field.widget==="number"||!bounded(field))return numberEntry(field,id,events,"wide");
 return slider(field,id,events);
 }
-return { control };
+return { control, strengthControl };
 })();
 const forms_folds = (() => {
 const { hex, linear } = lib_color;
 const { element } = lib_dom;
 const { compact, inWords } = lib_format_text;
 const { isObject } = lib_patch;
+const { amountWords } = forms_amounts;
 const ORDER=["Base","Specular","Coat","Sheen","Transmission","Subsurface","Film","Emission","Geometry"];
 const MOST_WORDS=3;
 const byHand=new Map();
 const place=(group)=>(ORDER.indexOf(group)+ 1||ORDER.length + 1)- 1;
-function words({title,widget},value,group){
+function words(field,value,group){
+const{title,widget}=field;
 const short = title.replace(new RegExp(`^(${group}|clearcoat) `, "i"), "").toLowerCase();
-if (value?.texture !== undefined) return `${short} ${value.texture}`;
-if(isObject(value))return short;
-if (widget === "color") return `${short} ${hex(linear(value))}`;
-if (typeof value === "boolean") return value ? short : `no ${short}`;
-return `${short} ${typeof value === "string" ? inWords(value).toLowerCase() : compact(value)}`;
+if (value?.texture !== undefined) return [`${short} ${value.texture}`];
+if(widget==="color")return [swatch(value),short];
+if(isObject(value))return [short];
+if (["amount", "amounts"].includes(widget)) return [`${short} ${amountWords(field, value)}`];
+if (typeof value === "boolean") return [value ? short : `no ${short}`];
+return [`${short} ${typeof value === "string" ? inWords(value).toLowerCase() : compact(value)}`];
+}
+function swatch(value){
+const now=linear(value);
+const most=Math.max(1,...now);
+const dot=element("i",{class:"swatch"});
+dot.style.setProperty("background", hex(now.map((x) => x / most)));
+return dot;
 }
 function folds(rows,fields){
 const groups=[...new Set(fields.map(({group})=>group))].sort((a,b)=>place(a)- place(b));
@@ -897,9 +1084,13 @@ element:element("div",{class:"folds"},...parts.map(({node})=>node)),
 show(values){
 for(const{group,own,told,node}of parts){
 const changed=own.filter(({name})=>rows.get(name).isChanged());
-const texts=changed.slice(0,MOST_WORDS).map((field)=>words(field,values[field.name],group));
-const text=[...texts,...(changed.length>MOST_WORDS ? ["…"]:[])].join(", ");
-if(told.textContent !==text)told.textContent=text;
+const first=changed.slice(0,MOST_WORDS);
+const now=JSON.stringify([changed.length,first.map(({name})=>[name,values[name]])]);
+if(told.dataset.now !==now){
+const parts=first.flatMap((field,i)=>[...(i ? [", "]:[]),...words(field,values[field.name],group)]);
+told.replaceChildren(...parts,...(changed.length>MOST_WORDS ? [", …"]:[]));
+told.dataset.now=now;
+}
 node.classList.toggle("changed",changed.length>0);
 }
 if(!isMade)sift();
@@ -977,6 +1168,7 @@ return { describe };
 })();
 const forms_schema_form = (() => {
 const { linear } = lib_color;
+const { isLength } = forms_amounts;
 const { control } = forms_controls;
 const { element, freshId } = lib_dom;
 const { folds } = forms_folds;
@@ -988,7 +1180,7 @@ const { endsOf } = lib_span;
 const { describe } = lib_tooltip;
 const { unitText } = lib_format_text;
 const isSame=({widget},a,b)=>
-widget==="color"&&a !==undefined&&b !==undefined ? equal(linear(a),linear(b)):equal(a,b);
+["color","amounts"].includes(widget)&&a !==undefined&&b !==undefined ? equal(linear(a),linear(b)):equal(a,b);
 const isTexture=(value)=>isObject(value)&&value.texture !==undefined;
 function row(field,{change,commit,forgive,takeFile,pickFile,slot,beneath}){
 const id=freshId(field.name);
@@ -1029,9 +1221,9 @@ commit();
 },
 });
 const label=element("label",{for:id},field.title);
-if(field.unit){
+if(field.unit&&!isLength(field)){
 const unit=unitText(field.unit);
-label.append(unit.length<3 ? "\u00a0":" ",element("span",{class:"unit"},unit));
+label.append(unit.length<3 ? "\u00a0":" ",element("span",{class:"unit","aria-hidden":"true"},unit));
 }
 if(widget.drag)scrubBy(label,widget.drag);
 const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
@@ -1203,7 +1395,11 @@ const dot=(a,b)=>a.reduce((sum,x,i)=>sum + x * b[i],0);
 const cross=([a,b,c],[x,y,z])=>[b * z - c * y,c * x - a * z,a * y - b * x];
 const length=(a)=>Math.hypot(...a);
 const normalize = (a) => scale(a, 1 / length(a));
-const tidy=(a)=>a.map((x)=>Number(x.toPrecision(7)));
+const DUST=1e-9;
+const tidy=(a)=>{
+const least=DUST * Math.max(...a.map(Math.abs));
+return a.map((x)=>(Math.abs(x)<least ? 0:Number(x.toPrecision(7))));
+};
 function turn(v,axis,angle){
 const [c,s]=[Math.cos(angle),Math.sin(angle)];
 return add(add(scale(v,c),scale(cross(axis,v),s)),scale(axis,dot(axis,v)*(1 - c)));
