@@ -208,8 +208,10 @@ export class Handles {
     const before = this.#box();
     const follow = moving(this.#view, pivot, handle, from);
     const isLevel = ["X", "Z", "plane Y"].includes(handle);
+    // No finer than a pixel: a hand has no more digits.
+    const fine = 10 ** Math.floor(Math.log10(metresPerPixel(this.#view, pivot)));
     return (place, isFree) => {
-      const offset = follow(place);
+      const offset = follow(place).map((x) => Number((Math.round(x / fine) * fine).toPrecision(12)));
       const drop = isFree || isLevel ? null : this.#drop(before, offset);
       const isNear = drop !== null && Math.abs(drop) < SNAP_PX * metresPerPixel(this.#view, pivot);
       const by = isNear ? add(offset, [0, drop, 0]) : offset;
