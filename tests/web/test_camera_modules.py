@@ -25,12 +25,14 @@ def test_a_point_is_seen_where_its_ray_goes(page: Page, position: list[float], l
         seen = call(page, "document/camera.js", "project", camera, place, 1.5)
         assert (seen["x"], seen["y"]) == pytest.approx((x, y))
         assert seen["z"] > 0
-        assert call(page, "picture/markers.js", "spot", camera, np.add(origin, direction).tolist(), 1.5)["isInside"]
+        assert call(page, "picture/lamp-outlines.js", "spot", camera, np.add(origin, direction).tolist(), 1.5)[
+            "isInside"
+        ]
     if lens["type"] != "perspective":
         return
     behind = np.add(position, np.subtract(position, camera["target"])).tolist()
     above = np.add(behind, [0, 0.5, 0]).tolist()
-    mark = call(page, "picture/markers.js", "spot", camera, above, 1.5)
+    mark = call(page, "picture/lamp-outlines.js", "spot", camera, above, 1.5)
     assert not mark["isInside"] and mark["y"] == pytest.approx(0.04), "at the upper edge"
 
 

@@ -188,13 +188,26 @@ export function farther(document, target, factor) {
   return from ? shifted(document, scale(subtract(from, target), factor - 1)) : document;
 }
 
-// The corners of a lamp's outline, or {center, radius} of a ball; null where the document does not tell.
+// A lamp's outline: {center, radius} of a ball, or {rings}, the polygons between which it lies: one of a flat shape, two of a
+// tube or a box; null where the document does not tell.
 export function outlineOf(document) {
   if (isLight(document)) return null;
   const own = ownBox(document);
   if (document.type === "sphere") return own && { center: middle(own), radius: (own.high[0] - own.low[0]) / 2 };
-  if (document.type === "disk") return rimsOf(document)[0].map((point) => place(point, document.transform));
-  if (document.type !== "quad") return null;
-  const { origin, u, v, transform } = document;
-  return [origin, add(origin, u), add(add(origin, u), v), add(origin, v)].map((point) => place(point, transform));
+  const rings = ringsOf(document);
+  return rings && { rings: rings.map((ring) => ring.map((point) => place(point, document.transform))) };
+}
+
+function ringsOf(document) {
+  const { type, origin, u, v, min, max } = document;
+  if (type === "disk" || type === "cylinder") return rimsOf(document);
+  if (type === "quad") return [[origin, add(origin, u), add(add(origin, u), v), add(origin, v)]];
+  if (type !== "box") return null;
+  const [[x0, y0, z0], [x1, y1, z1]] = [min, max];
+  return [y0, y1].map((y) => [
+    [x0, y, z0],
+    [x1, y, z0],
+    [x1, y, z1],
+    [x0, y, z1],
+  ]);
 }

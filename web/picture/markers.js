@@ -1,19 +1,19 @@
-// Lights over the picture: a mark where each one is, and the outline of one that is a shape. A click selects it; a drag, or
-// the arrow keys, slide it round what it shines at, with Shift they change its distance. What the camera looks at has a
-// mark where it is asked for.
+// Lights over the picture: a mark where each one is, an arrow at the picture's edge to one that is outside of it, and the
+// outline of one that is a shape. A click selects it; a drag, or the arrow keys, slide it round what it shines at, with
+// Shift they change its distance. What the camera looks at has a mark where it is asked for.
 
-import { axes, project } from "../document/camera.js";
-import { farther, lampsOf, outlineOf, positionOf, slid, targetOf } from "../document/lamps.js";
+import { axes } from "../document/camera.js";
+import { farther, lampsOf, positionOf, slid, targetOf } from "../document/lamps.js";
 import { element } from "../lib/dom.js";
 import { watchDrags } from "../lib/drag.js";
 import { things } from "../document/things.js";
 import { icon } from "../lib/icon.js";
 import { add, normalize, scale } from "../lib/vector.js";
-import { metresPerPixel } from "./handle-drags.js";
 import { shape } from "./handle-shapes.js";
+import { clearOf, outlinePath, spot } from "./lamp-outlines.js";
 
 const FAR = 1e4; // distances to the target: where a sun stands, that has a direction alone
-const EDGE = 0.04; // of the picture: how far inside of it a mark stays
+const ARROW_PX = 10; // how far the tip of an arrow sticks out of its mark
 const STILL = 4; // CSS pixels that a hand may slip during a click
 const TURN = Math.PI; // of a light, by a drag across the picture
 const STEP = Math.PI / 90; // by an arrow key
@@ -24,31 +24,8 @@ const placeOf = (document, camera) =>
   positionOf(document) ??
   (document.direction && add(camera.target, scale(normalize(document.direction), -FAR * axes(camera).distance)));
 
-// Where in the picture a mark stands: {x, y} 0..1, and whether the point itself is in it.
-export function spot(camera, point, aspect) {
-  const { x, y, z } = project(camera, point, aspect);
-  if (z > 0 && x >= 0 && x <= 1 && y >= 0 && y <= 1) return { x, y, isInside: true };
-  // From the middle towards it, as far as the edge; what is behind the eye appears mirrored.
-  const way = z > 0 ? [x - 0.5, y - 0.5] : [0.5 - x, 0.5 - y];
-  const reach = (0.5 - EDGE) / Math.max(Math.abs(way[0]), Math.abs(way[1]), 1e-9);
-  return { x: 0.5 + way[0] * reach, y: 0.5 + way[1] * reach, isInside: false };
-}
-
-// The outline of a lamp in pixels of the picture, as an SVG path; empty where it has none, or is not all before the eye.
-function pathOf(document, view) {
-  const { camera, aspect, height } = view;
-  const outline = outlineOf(document);
-  if (!outline) return "";
-  if (outline.center) {
-    const { x, y, z } = project(camera, outline.center, aspect);
-    const r = outline.radius / metresPerPixel(view, outline.center);
-    if (z <= outline.radius) return "";
-    return `M${x * aspect * height - r} ${y * height}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z`;
-  }
-  const corners = outline.map((point) => project(camera, point, aspect));
-  if (corners.some(({ z }) => z <= 0)) return "";
-  return `M${corners.map(({ x, y }) => `${x * aspect * height} ${y * height}`).join("L")}Z`;
-}
+// What lies over the picture's edges, and marks stay clear of.
+const OVER = ".outliner, .tools, .pill, .axis-views, .comparison, .hint, .corner > *";
 
 export class Markers {
   #shown = "";
@@ -127,13 +104,13 @@ export class Markers {
         icon: "light",
         title: titles.get(thing),
         point: placeOf(document, camera),
-        path: pathOf(document, { camera, aspect, height }),
+        path: outlinePath(document, { camera, aspect, height }),
       }))
       .filter(({ point }) => point);
     const target = { thing: "/camera", icon: "camera", title: "What the camera looks at", point: camera.target };
     const marks = [...lamps, ...(hasTarget ? [target] : [])]
       .map((each) => ({ ...each, isChosen: each.thing === chosen.thing, ...spot(camera, each.point, aspect) }))
-      .filter(({ isInside, isChosen, path }) => isInside || isChosen || path);
+      .filter(({ isInside, isChosen, icon: name }) => isInside || isChosen || name === "light");
     this.#outlines.replaceChildren(
       ...marks
         .filter(({ path }) => path)
@@ -142,18 +119,49 @@ export class Markers {
         ),
     );
     this.#make(marks);
-    marks.forEach(({ x, y, isInside, isChosen }, i) => {
+    const places = this.#places(marks, aspect * height, height);
+    marks.forEach(({ isInside, isChosen, way }, i) => {
       const mark = this.#buttons.children[i];
-      mark.style.setProperty("left", isInside ? `${100 * x}%` : `min(${100 * x}%, 100% - var(--axes))`);
-      // One outside of the picture stays clear of the tools, the pill and the axes, which lie over its edges.
-      mark.style.setProperty(
-        "top",
-        isInside ? `${100 * y}%` : `clamp(var(--clear), ${100 * y}%, 100% - var(--clear))`,
-      );
+      mark.style.setProperty("left", `${places[i].x}px`);
+      mark.style.setProperty("top", `${places[i].y}px`);
+      mark.style.setProperty("--way", `${way ?? 0}rad`);
       mark.classList.toggle("outside", !isInside);
       mark.classList.toggle("chosen", isChosen);
       mark.tabIndex = isChosen ? 0 : -1;
     });
+  }
+
+  // Where the marks stand in pixels of the picture: those that lead outside clear of one another and of what lies over the
+  // picture's edges, the chosen one first.
+  #places(marks, width, height) {
+    const plain = marks.map(({ x, y }) => ({ x: x * width, y: y * height }));
+    if (marks.every(({ isInside }) => isInside)) return plain;
+    const own = this.root.getBoundingClientRect();
+    const onto = ({ left, top, right, bottom }) => ({
+      left: left - own.left,
+      top: top - own.top,
+      right: right - own.left,
+      bottom: bottom - own.top,
+    });
+    const boxes = [...document.querySelectorAll(OVER)]
+      .filter((each) => each.checkVisibility())
+      .map((each) => onto(each.getBoundingClientRect()));
+    const seen = onto(this.root.closest(".stage").getBoundingClientRect());
+    const room = {
+      left: Math.max(0, seen.left),
+      top: Math.max(0, seen.top),
+      right: Math.min(width, seen.right),
+      bottom: Math.min(height, seen.bottom),
+    };
+    const size = (this.#buttons.firstElementChild?.offsetWidth ?? 0) / 2 + ARROW_PX;
+    const order = marks.map((_, i) => i).sort((a, b) => marks[b].isChosen - marks[a].isChosen);
+    for (const i of order) {
+      if (marks[i].isInside) continue;
+      const { x, y } = clearOf(plain[i], size, boxes, room);
+      plain[i] = { x, y };
+      boxes.push({ left: x - size, top: y - size, right: x + size, bottom: y + size });
+    }
+    return plain;
   }
 
   #make(marks) {

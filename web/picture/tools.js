@@ -52,13 +52,15 @@ export class Tools {
     this.overlay();
   }
 
-  // Where lights are, while one of these, the environment or the camera is selected and no material is looked at.
+  // Where lights are, while one of these, the environment or the camera is selected and no material is looked at, or the
+  // tool is one for lights.
   mark(aspect) {
     this.picks.mark();
     const { scene, chosen } = this.acts.state;
     const { tool, target } = this.ui.state;
     const isLight = lampsOf(scene).some(({ thing }) => thing === chosen.thing);
-    const isOn = (isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect";
+    const isOn =
+      tool === "highlight" || ((isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect");
     const tall = fitGuides(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, aspect, tall, target);
     const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
