@@ -8,12 +8,14 @@ import { at } from "../lib/patch.js";
 import { cameraModels, environmentModels, fields, lightModels, shapeModels, transformModel } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
 import * as transforms from "../document/transforms.js";
+import { isSet } from "../document/emission.js";
 import { things } from "../document/things.js";
 
 export class ThingPart {
   #made = null; // what the form was made for
   #forms = [];
   #newMaterial = element("option", {}, "New material");
+  #lamp = { key: null, isOne: false }; // whether the selected thing is shown as a lamp
 
   // `find(id)` elements; `schema` of the scene; `acts` the editor; `stage` what Panel has; `environments` the presets.
   constructor(find, { schema, acts, stage, environments }) {
@@ -30,6 +32,7 @@ export class ThingPart {
       ...Object.keys(cameraModels(schema)).map((type) => element("option", { value: type }, inWords(type))),
     );
     find("camera-type").addEventListener("change", ({ target }) => acts.turnCamera(target.value));
+    find("lamp-more").addEventListener("click", () => this.#fold(!this.#isFolded));
     find("thing-material").addEventListener("change", ({ target }) => {
       if (target.selectedOptions[0] === this.#newMaterial)
         return acts.change(added(acts.state, "material", acts.plainMaterial));
@@ -47,12 +50,13 @@ export class ThingPart {
     const before = this.thing;
     this.thing = isMaterial || all.some(({ thing }) => thing === chosen.thing) ? chosen.thing : "/camera";
     const own = all.find(({ thing }) => thing === this.thing);
+    this.#showLamp(scene);
     this.#find("thing-part").hidden = !own;
     this.#find("film-part").hidden = this.thing !== "/camera";
     this.#find("material-part").hidden = Boolean(own) && !this.thing.startsWith("/shapes/");
     if (own) this.#showThing(scene, own);
     else this.#made = null;
-    const isWanted = this.thing === "/environment" || at(scene, this.thing)?.medium;
+    const isWanted = this.#lamp.isOne || this.thing === "/environment" || at(scene, this.thing)?.medium;
     if (isWanted || (before && before !== this.thing)) this.more.get().catch(this.more.complain);
     this.#showMore(scene);
     const { environment } = chosen;
@@ -71,7 +75,34 @@ export class ThingPart {
 
   #showMore(scene) {
     const owner = this.#model(at(scene, this.thing));
-    this.more.now?.show(scene, this.thing, owner);
+    this.more.now?.show(scene, this.thing, owner, this.#lamp.isOne);
+  }
+
+  // A lamp has a form of its own, and what it is besides stands below that, folded. A thing that becomes one, or ceases to
+  // be one, under the hand stays what it was.
+  #showLamp(scene) {
+    const { type, material } = at(scene, this.thing) ?? {};
+    const key = [this.thing, type, material].join(" ");
+    const page = this.#find("page-properties");
+    if (key === this.#lamp.key && page.contains(document.activeElement)) return;
+    const isOne = isSet(scene, this.thing);
+    const isOther = isOne !== this.#lamp.isOne;
+    this.#lamp = { key, isOne };
+    if (!isOther) return;
+    this.#find("lamp-more").hidden = !isOne;
+    const [own, body] = [this.#find("thing-part"), this.#find("material-part")];
+    if (isOne) body.before(own);
+    else body.after(own);
+    this.#fold(this.#isFolded);
+  }
+
+  #isFolded = true;
+
+  #fold(isFolded) {
+    this.#isFolded = isFolded;
+    const { isOne } = this.#lamp;
+    this.#find("page-properties").dataset.lamp = isOne ? (isFolded ? "folded" : "open") : "none";
+    this.#find("lamp-more").setAttribute("aria-expanded", String(!isFolded));
   }
 
   #showThing(scene, { title }) {
@@ -101,6 +132,13 @@ export class ThingPart {
     for (const { place, form, read } of this.#forms) form.show(read(at(scene, place)));
   }
 
+  // Those of a model; a lamp's strength and angles are in its own form.
+  #fields(owner) {
+    const all = fields(this.schema, owner);
+    if (!this.thing.startsWith("/lights/")) return all;
+    return all.filter(({ widget, unit }) => widget !== "color" && unit !== "degrees");
+  }
+
   #make(kind, document, isShape) {
     this.#made = kind;
     const own = this.#model(document);
@@ -108,7 +146,7 @@ export class ThingPart {
       ? [
           {
             place: this.thing,
-            fields: fields(this.schema, own).map((field) =>
+            fields: this.#fields(own).map((field) =>
               this.thing === "/environment" && field.name === "scale" ? { ...field, widget: "strength" } : field,
             ),
             read: (values) => values ?? {},
