@@ -152,10 +152,11 @@ export function laterParts({
     ({ Sweep }) => new Sweep({ schema, page, acts: editor, say }),
     { complain },
   );
-  let touched; // the parameter that had the focus last
-  find("material-form").addEventListener("focusin", ({ target }) => {
-    touched = target.closest("[data-field]")?.dataset.field ?? touched;
-  });
+  let touched; // the parameter that a hand was at last
+  for (const kind of ["focusin", "pointerdown", "input"])
+    find("material-form").addEventListener(kind, ({ target }) => {
+      touched = target.closest("[data-field]")?.dataset.field ?? touched;
+    });
   sweep.nears(find("sweep-material"));
   find("sweep-material").addEventListener("click", () => sweep.calls("open")(touched, find("material-more")));
 

@@ -1,11 +1,15 @@
 // "Sweep a parameter": the picture with one parameter of the material in hand at values along its range, side by side.
 // A click takes one. The server renders them as one batch, which ends with the dialog.
 
-import { presentValue, sweepable, sweepOrder, sweepValues } from "../document/sweep.js";
+import { firstOf, isColor, presentValue, sweepable, sweepEnds, sweepOrder, sweepValues } from "../document/sweep.js";
 import { users } from "../document/materials.js";
+import { amountWords } from "../forms/amounts.js";
+import { SweepEnds } from "../forms/sweep-ends.js";
 import { show } from "../forms/thumbnails.js";
+import { hex, linear } from "../lib/color.js";
 import { element, freshId } from "../lib/dom.js";
 import { amount, compact, inWords, unitText } from "../lib/format-text.js";
+import { equal } from "../lib/patch.js";
 import { PictureList } from "../lib/picture-list.js";
 import { cancelBatch, batchStatus, renderImage, startBatch } from "../server/api.js";
 import { fieldTitles, problemText } from "../server/problem-text.js";
@@ -82,12 +86,10 @@ export class Sweep {
     const offered = sweepable(own, material);
     if (!offered.length) return this.acts.complain(new Error("This material has no parameter with a range."));
     const id = freshId("sweep");
-    const select = element("select", { id: `${id}-of`, onchange: () => sweep() }, ...options(offered));
-    // Else one of the fold that is open first, as an artist meets it.
-    const wished =
-      offered.find((field) => field.name === name) ?? offered.find(({ group }) => group === own[0].group);
-    select.value = (wished ?? offered[0]).name;
+    const select = element("select", { id: `${id}-of`, onchange: () => choose() }, ...options(offered));
+    select.value = firstOf(offered, material, name).name;
     const row = element("div", { class: "sweep" });
+    const ends = new SweepEnds(() => sweep());
     const status = element("p", { class: "note", role: "status" });
     const trouble = element("p", { class: "trouble", role: "alert", hidden: true });
     const unused = users(state.scene, state.chosen.material).length === 0;
@@ -100,22 +102,27 @@ export class Sweep {
         element("h2", { id }, `Sweep a parameter of ${state.chosen.material}`),
         element("button", { type: "button", class: "button small", onclick: () => dialog.close() }, "Close"),
       ),
-      element("div", { class: "row" }, element("label", { for: `${id}-of` }, "Parameter"), select),
+      element("div", { class: "row" }, element("label", { for: `${id}-of` }, "Parameter"), select, ends.element),
       unused ? element("p", { class: "note" }, "Nothing is made of this material: all pictures are alike.") : null,
       row,
       status,
       trouble,
     );
     let batch = null;
+    const swept = () => offered.find((each) => each.name === select.value);
+    const choose = () => {
+      ends.show(swept(), sweepEnds(own, material, swept()));
+      sweep();
+    };
     const sweep = () => {
       batch?.leave();
       batch = new Batch();
-      const field = offered.find((each) => each.name === select.value);
-      this.#fill({ batch, row, status, trouble, own, material, field }, (value) => {
+      const field = swept();
+      this.#fill({ batch, row, status, trouble, own, material, field, ends: ends.value }, (value) => {
         dialog.close();
-        if (value === presentValue(own, material, field)) return;
+        if (equal(value, presentValue(own, material, field))) return;
         this.acts.edit(`${place}/${field.name}`, value, null);
-        this.say(`${field.title}: ${compact(value)}`);
+        this.say(`${field.title}: ${words(field, value)}`);
       });
     };
     const leave = () => batch.leave();
@@ -128,13 +135,14 @@ export class Sweep {
       if (document.activeElement === document.body) from.focus();
     });
     document.body.append(dialog);
-    sweep();
+    choose();
     dialog.showModal();
   }
 
-  async #fill({ batch, row, status, trouble, own, material, field }, take) {
+  async #fill({ batch, row, status, trouble, own, material, field, ends }, take) {
     const present = presentValue(own, material, field);
-    const values = sweepValues(own, material, field);
+    const values = sweepValues(own, material, field, ends);
+    const keyOf = (value) => (typeof value === "number" ? String(value) : JSON.stringify(value));
     const { size, view } = this.page;
     const list = element("div", {
       class: "tiles",
@@ -146,16 +154,15 @@ export class Sweep {
     row.replaceChildren(list);
     trouble.hidden = true;
     const images = [];
-    const pictures = new PictureList(list, { choose: (value) => take(Number(value)) });
-    const told = (value) => `${compact(value)} ${unitText(field.unit)}`.trim();
+    const pictures = new PictureList(list, { choose: (key) => take(values.find((value) => keyOf(value) === key)) });
     pictures.fill(
       values.map((value) => {
-        const words = value === present ? `${told(value)}, now` : told(value);
-        return { value: String(value), title: words };
+        const told = words(field, value);
+        return { value: keyOf(value), title: equal(value, present) ? `${told}, now` : told };
       }),
       (image) => images.push(image),
     );
-    pictures.mark(String(present));
+    pictures.mark(keyOf(present ?? null));
     let [count, lost] = [0, 0];
     const tell = () => {
       status.textContent = `${count} of ${values.length} pictures are rendered.`;
@@ -183,6 +190,16 @@ export class Sweep {
     if (lost) status.textContent = `${amount(lost, "picture")} could not be rendered.`;
     else if (count === values.length) status.textContent = "Choose a picture to take its value.";
   }
+}
+
+// A value of a field as its picture has it.
+function words(field, value) {
+  if (isColor(field)) {
+    const now = linear(value);
+    return hex(now.map((x) => x / Math.max(1, ...now)));
+  }
+  if (field.log) return amountWords(field, value);
+  return `${compact(value)} ${unitText(field.unit)}`.trim();
 }
 
 // The fields under the names of their groups.
