@@ -150,3 +150,83 @@ def test_marks_and_strengths(editor: Editor) -> None:
     page.click("#outline-list [data-thing='/environment']")
     page.get_by_role("slider", name="Environment rotation").fill("90")
     assert document(editor)["environment"]["rotation"] == 90
+
+
+def test_a_lamp_is_set_as_a_photographer_does(editor: Editor) -> None:
+    """By temperature, stops, size and distance; what it is besides stands below, folded."""
+    page = editor.page
+    editor.settled()
+    before = add(editor, "Area light")
+    quad = before["shapes"][2]
+    page.locator("#lamp-part [data-field=temperature]").wait_for()
+
+    def value(name: str, label: str) -> Any:
+        return page.locator(f"#lamp-part [data-field={name}]").get_by_label(label)
+
+    def lamp() -> Any:
+        return document(editor)["materials"]["area light"]["emission"]
+
+    assert page.is_hidden("#material-part") and page.is_hidden("#thing-form")
+    warmth = value("temperature", "Colour temperature: a temperature or a colour")
+    assert "2700K" in page.inner_text("#lamp-part"), "that it may be typed is seen"
+    power = max(lamp() if isinstance(lamp(), list) else [lamp()])
+    warmth.fill("2700K")
+    warmth.press("Enter")
+    red, green, blue = lamp()
+    assert red > green > blue > 0 and np.dot(lamp(), [0.2126, 0.7152, 0.0722]) == pytest.approx(power, rel=1e-3)
+    slider = page.get_by_role("slider", name="Colour temperature")
+    assert slider.get_attribute("aria-valuetext") == "2\u202f700 K, Tungsten"
+    page.get_by_label("Colour temperature, by name").select_option("10000")
+    assert lamp()[2] > lamp()[0], "the sky is blue"
+    warmth.fill("#00ff00")
+    warmth.press("Enter")
+    assert slider.get_attribute("aria-valuetext") == "own colour" and warmth.input_value() == ""
+
+    stops = value("power", "Emission, strength in stops")
+    stops.fill("3")
+    stops.press("Enter")
+    assert np.dot(lamp(), [0.2126, 0.7152, 0.0722]) == pytest.approx(8, rel=1e-3)
+    width = value("width", "Width, number")
+    width.fill("52 cm")
+    width.press("Enter")
+    after = document(editor)["shapes"][2]
+    assert np.linalg.norm(after["u"]) == pytest.approx(0.52) and np.linalg.norm(after["v"]) == pytest.approx(
+        np.linalg.norm(quad["v"])
+    )
+    share = np.linalg.norm(quad["u"]) / 0.52
+    assert np.dot(lamp(), [0.2126, 0.7152, 0.0722]) == pytest.approx(8 * share, rel=1e-3), "as much light as before"
+    page.keyboard.press("Escape")
+    page.click("#undo")
+    assert document(editor)["shapes"][2]["u"] == quad["u"], "size and light are one step of undo"
+    distance = value("distance", "Distance, number")
+    distance.fill("3 m")
+    distance.press("Enter")
+    assert np.linalg.norm(aim(document(editor)["shapes"][2])[0] - [0, 1, 0]) == pytest.approx(3, rel=1e-3)
+
+    more = page.get_by_role("button", name="More", exact=True)
+    assert more.get_attribute("aria-expanded") == "false"
+    more.click()
+    assert page.is_visible("#material-form [data-field=albedo]") and page.is_visible("#thing-form [data-field=u]")
+    assert editor.complaints == []
+
+
+def test_arrows_lead_to_lamps_outside_of_the_picture(editor: Editor) -> None:
+    page = editor.page
+    editor.settled()
+    add(editor, "Area light")
+    add(editor, "Spot light")
+    marks = page.locator("#markers .mark.outside")
+    assert marks.count() == 2
+    bar = page.locator("#tools").bounding_box()
+    assert bar
+    for i in range(2):
+        box = marks.nth(i).bounding_box()
+        assert box
+        beside = box["x"] > bar["x"] + bar["width"] or box["x"] + box["width"] < bar["x"]
+        assert beside or box["y"] >= bar["y"] + bar["height"], "clear of the tools"
+    page.locator("#markers .mark.outside:not(.chosen)").click()
+    assert page.get_attribute("#outline-list [data-thing='/shapes/2']", "aria-selected") == "true"
+    page.click("#outline-list [data-thing='/shapes/0']")
+    assert page.is_hidden("#markers")
+    page.click("[data-tool=highlight]")
+    editor.wait("the marks", lambda: page.is_visible("#markers"))
