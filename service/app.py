@@ -55,7 +55,8 @@ from service.routes import (
 )
 from service.routes import presets as preset_routes
 from service.routes.description import describe
-from service.routes.errors import Files, respond, tell_errors
+from service.routes.editor_files import EditorFiles
+from service.routes.errors import respond, tell_errors
 from service.state import MESSAGE_BYTES, STARTING_S, AppState, app_state
 from service.storage.database import DamagedFile
 from service.storage.stores import storage
@@ -117,7 +118,7 @@ def create_app(config: Config, places: Sequence[Seat] = ()) -> FastAPI:
         app.include_router(each.router, dependencies=waits)
     app.add_api_route("/docs", _docs, include_in_schema=False)
     describe(app, keyed=bool(config.api_key))
-    app.mount("/", Files(directory=WEB, html=True))
+    app.mount("/", EditorFiles(directory=WEB, html=True))
     tell_errors(app)
     app.add_middleware(Compressed)
     app.add_middleware(Guard, config=config, refuse=respond)

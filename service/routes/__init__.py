@@ -24,6 +24,7 @@ info             what the service is, whether it lives, what its documents look 
 answers          what answers look like, for the API's description
 json_answers     answers whose JSON is made in a thread
 request_fields   what requests for renders and batches share, for the description
+editor_files     the files of the page
 errors           errors as problem+json
 description      openapi.json
 examples         documents that the description shows

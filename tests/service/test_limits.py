@@ -93,6 +93,7 @@ CODE = {
     "requests/request_reader.py self.stream_memory = Limit": LIMIT,
     "routes/assets.py to_thread": PIECES,
     "routes/bsdf.py AT_ONCE": "numbers of one answer that are encoded at once",
+    "routes/editor_files.py MOST": "files of the page, of which there are fewer",
     "routes/events.py AT_ONCE": "events of one stream of them",
     "routes/example_answers.py WAITING": "an example of an answer",
     "state.py MOST_WAITS": "of one caller",
