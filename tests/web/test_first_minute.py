@@ -91,6 +91,22 @@ def test_the_last_picture_of_a_scene_stands_until_the_next_is_there(
     assert editor.complaints == []
 
 
+def test_the_page_is_laid_out_before_its_code_runs(editor: Editor, server: Server) -> None:
+    """Nothing that has a place of its own moves when the page comes to life."""
+    early = editor.page.context.new_page()
+    early.route("**/main.js", lambda route: route.abort())
+    early.goto(server.url)
+    for width, height in ((390, 844), (844, 390), (1024, 768), (1440, 900)):
+        for page in (early, editor.page):
+            page.set_viewport_size({"width": width, "height": height})
+        editor.wait("the outline as there is room", lambda: editor.page.get_attribute("body", "data-outline"))
+        editor.page.wait_for_timeout(100)
+        for part in (".top", "main", "#shelf", "#panel", ".tools", "#render"):
+            before, after = (page.locator(part).bounding_box() for page in (early, editor.page))
+            assert before == pytest.approx(after, abs=1), (width, height, part)
+    early.close()
+
+
 def test_what_is_being_prepared_says_how_long_that_may_take(blank: Editor, held: Held) -> None:
     editor, page = blank, blank.page
     page.evaluate("localStorage['sunbox.preparing'] = JSON.stringify({ scene: [1, 400, 500, 600], change: [50] })")

@@ -31,6 +31,26 @@ CUT = """() => [...document.querySelectorAll("input.entry")]
     .filter((each) => each.checkVisibility() && each.scrollWidth > each.clientWidth)
     .map((each) => `${each.getAttribute("aria-label") ?? each.id}: ${each.value}`)"""
 
+# Words in empty boxes and in menus, by the widths of their letters.
+UNREAD = """() => {
+    const pen = new OffscreenCanvas(1, 1).getContext("2d");
+    const wide = (each, text) => {
+        const { font } = getComputedStyle(each);
+        pen.font = font;
+        return pen.measureText(text).width;
+    };
+    return [...document.querySelectorAll("input[placeholder], select")].filter((each) => each.checkVisibility())
+        .map((each) => {
+            const { paddingLeft, paddingRight } = getComputedStyle(each);
+            const isMenu = each.matches("select");
+            const arrow = isMenu ? 14 : 0;
+            const room = each.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - arrow;
+            const text = isMenu ? each.selectedOptions[0]?.text ?? "" : each.value ? "" : each.placeholder;
+            const { color } = getComputedStyle(each, isMenu ? null : "::placeholder"); // a sign may stand in its place
+            return [color === "rgba(0, 0, 0, 0)" || wide(each, text) <= room + 1, text];
+        }).filter(([fits]) => !fits).map(([, text]) => text);
+}"""
+
 
 @pytest.fixture
 def at(visit: Callable[..., Editor], request: pytest.FixtureRequest) -> Editor:
@@ -62,6 +82,22 @@ def test_values_fit_into_their_boxes(at: Editor, others: list[tuple[int, int]]) 
             values = "[...document.querySelectorAll('#thing-form input.entry')].map((e) => e.value)"
             shown |= set(page.evaluate(values))
         assert {"2.417", "49.56", "15.53", "-49.56", "-115.5"} <= shown
+
+
+@pytest.mark.parametrize(
+    ("at", "others"), [((1440, 900, False), [(1024, 768)]), ((390, 844, True), [(844, 390)])], indirect=["at"]
+)
+def test_words_in_boxes_and_menus_are_whole(at: Editor, others: list[tuple[int, int]]) -> None:
+    page = at.page
+    for size in (None, *others):
+        if size is not None:
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+        at.tab("material")
+        at.unfold()
+        assert page.evaluate(UNREAD) == [], size
+        for tab in ("render", "film"):
+            at.tab(tab)
+            assert page.evaluate(UNREAD) == [], (size, tab)
 
 
 @pytest.mark.parametrize("at", [DESK], indirect=True)

@@ -19,7 +19,10 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     editor.wait("the floor", lambda: editor.chosen("materials") == "floor")
     editor.wait("its outline", lambda: overlay(editor, "outline")[..., 3].any())
     rows = np.flatnonzero(overlay(editor, "outline")[..., 3].any(axis=1))
-    assert rows.min() > 0.2 * editor.page.evaluate("picture.height"), "the floor ends at the horizon"
+    outline = "document.querySelector('#outline')"
+    assert rows.min() > 0.2 * editor.page.evaluate(f"{outline}.height"), "the floor ends at the horizon"
+    scale = editor.page.evaluate(f"{outline}.height / ({outline}.clientHeight * devicePixelRatio)")
+    assert scale == pytest.approx(1, abs=0.02), "as fine as the screen, whatever the picture is"
     click(editor, 0.5, 0.5)
     editor.wait("the ball", lambda: editor.chosen("materials") == "subject")
     shown = "document.querySelector('#outline').classList.contains('shown')"
@@ -31,6 +34,10 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     click(editor, 0.5, 0.02)
     editor.wait("the sky", lambda: editor.text("#thing-title") == "Environment")
     assert editor.samples() >= samples, "picking costs no sample"
+    click(editor, 0.5, 0.5)
+    editor.wait("its outline", lambda: editor.page.evaluate(shown))
+    editor.page.select_option("#thing-material", "floor")
+    assert editor.page.evaluate(shown), "it stays while another material is prepared"
 
 
 def test_frame_focus_and_fly(editor: Editor) -> None:
