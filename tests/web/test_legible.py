@@ -31,7 +31,7 @@ CUT = """() => [...document.querySelectorAll("input.entry")]
     .filter((each) => each.checkVisibility() && each.scrollWidth > each.clientWidth)
     .map((each) => `${each.getAttribute("aria-label") ?? each.id}: ${each.value}`)"""
 
-# Words in empty boxes and in menus, by the widths of their letters.
+# Words in empty boxes and in menus, by the widths of their letters; without a colour a sign stands there.
 UNREAD = """() => {
     const pen = new OffscreenCanvas(1, 1).getContext("2d");
     const wide = (each, text) => {
@@ -46,7 +46,7 @@ UNREAD = """() => {
             const arrow = isMenu ? 14 : 0;
             const room = each.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - arrow;
             const text = isMenu ? each.selectedOptions[0]?.text ?? "" : each.value ? "" : each.placeholder;
-            const { color } = getComputedStyle(each, isMenu ? null : "::placeholder"); // a sign may stand in its place
+            const { color } = getComputedStyle(each, isMenu ? null : "::placeholder");
             return [color === "rgba(0, 0, 0, 0)" || wide(each, text) <= room + 1, text];
         }).filter(([fits]) => !fits).map(([, text]) => text);
 }"""

@@ -7,6 +7,7 @@ test_compare_sides."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from playwright.sync_api import Locator
@@ -48,6 +49,10 @@ HANDLES: list[tuple[tuple[str, str] | None, list[tuple[str, Sequence[str]]]]] = 
 ]
 
 
+def is_one(found: Locator) -> bool:
+    return found.count() == 1 and found.is_visible()
+
+
 def test_everything_has_the_role_and_the_name_that_the_contract_says(visit: Callable[..., Editor]) -> None:
     editor = visit((1280, 800))
     page = editor.page
@@ -60,8 +65,7 @@ def test_everything_has_the_role_and_the_name_that_the_contract_says(visit: Call
             by(*opened).click()
         for role, names in parts:
             for name in names:
-                found = by(role, name)
-                editor.wait(f"{role} {name!r}", lambda found=found: found.count() == 1 and found.is_visible())
+                editor.wait(f"{role} {name!r}", partial(is_one, by(role, name)))
         if opened == ("button", "Export"):
             page.keyboard.press("Escape")
 

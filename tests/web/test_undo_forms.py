@@ -60,7 +60,10 @@ STEPS = """async () => {
 }"""
 # What is opened, and fields of the forms that are there then.
 FORMS: list[tuple[str, set[str]]] = [
-    ("#outline-list [data-thing='/shapes/0'] .title", {"metallic", "scale", "position", "a", "priority", "translate"}),
+    (
+        "#outline-list [data-thing='/shapes/0'] .title",
+        {"metallic", "scale", "position", "a", "priority", "translate"},
+    ),
     ("#outline-list [data-thing='/lights/0'] .title", {"position"}),
     ("#outline-list [data-thing='/environment'] .title", {"radiance", "radius"}),
     ("#outline-list [data-thing='/camera'] .title", {"vfov", "exposure"}),
