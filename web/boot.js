@@ -1,9 +1,9 @@
 // What the page needs before it can begin: the schema, the library, and what to show first.
 
 import { Problem, fetchPreset, fetchSchema } from "./server/api.js";
-import { askForKey } from "./server/key.js";
 import { openLibrary } from "./forms/library.js";
-import { watchImages } from "./lib/images.js";
+import { watchImages } from "./lib/dom.js";
+import { askForKey } from "./server/key.js";
 import { readLink, revived } from "./document/share.js";
 import { lastWork } from "./document/work.js";
 

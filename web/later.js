@@ -165,8 +165,9 @@ export function laterParts({
     ({ EnvironmentTurn }) => new EnvironmentTurn(find("environment-turn"), { schema: schema.scene, acts: editor }),
     { complain },
   );
+  turn.nears(find("tab-environments"));
 
-  const all = [textures, adder, importer, menus, finals, controller.tools, turn];
+  const all = [textures, adder, importer, menus, finals, controller.tools];
   return {
     comparison,
     textures,
@@ -177,6 +178,7 @@ export function laterParts({
     // Has them ready for a hand, now that nothing waits for the network.
     prepare() {
       const modules = [import("./lib/ask.js"), import("./lib/name-entry.js"), import("./keys-sheet.js")];
+      if (ui.state.drawer === "environments") turn.get().catch(complain);
       return Promise.allSettled([...all.map((part) => part.get()), ...modules]);
     },
   };

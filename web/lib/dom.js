@@ -20,5 +20,17 @@ export function element(tag, attributes = {}, ...children) {
   return node;
 }
 
+// Takes the source from each image whose picture does not come: style.css shows something plain in its place then, never
+// the browser's broken sign.
+export function watchImages(root) {
+  root.addEventListener(
+    "error",
+    ({ target }) => {
+      if (target.tagName === "IMG") target.removeAttribute("src");
+    },
+    true, // the event does not bubble
+  );
+}
+
 // True while the user writes into a field: its text must not be replaced under the hand.
 export const isBeingEdited = (input) => document.activeElement === input && input.dataset.dirty === "yes";

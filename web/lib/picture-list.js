@@ -2,8 +2,8 @@
 // Enter or Space chooses one.
 
 import { element } from "./dom.js";
-import { watchPull } from "./pull.js";
 
+const HAS_FINGERS = matchMedia("(any-pointer: coarse)").matches;
 const STEPS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
 export class PictureList {
@@ -16,11 +16,7 @@ export class PictureList {
   // finger, where there is no dataTransfer, move(x, y) and drop(x, y) too.
   constructor(root, { choose, follows = false, keys = {}, carry = null }) {
     Object.assign(this, { root, choose, follows, carry });
-    if (carry)
-      watchPull(root, (target) => target.closest("[role=option]"), {
-        ...carry,
-        take: ({ dataset }) => carry.take(dataset.value, null),
-      });
+    if (carry && HAS_FINGERS) this.#watchFingers();
     root.addEventListener("click", ({ target }) => {
       const option = target.closest("[role=option]");
       if (!option) return;
@@ -39,6 +35,14 @@ export class PictureList {
       else if (!STEPS[event.key] && event.key !== "Home" && event.key !== "End") return;
       event.preventDefault();
       event.stopPropagation(); // the page has other uses for these keys
+    });
+  }
+
+  async #watchFingers() {
+    const { watchPull } = await import("./pull.js");
+    watchPull(this.root, (target) => target.closest("[role=option]"), {
+      ...this.carry,
+      take: ({ dataset }) => this.carry.take(dataset.value, null),
     });
   }
 

@@ -5,7 +5,6 @@ import { DISPLAY } from "../document/picture-view.js";
 import { paired } from "../document/materials.js";
 import { showEditing } from "./editing.js";
 import { fillPicker } from "../forms/library.js";
-import { LookTable } from "./look-table.js";
 import { MaterialPanel } from "./material-panel.js";
 import { ThingPart } from "./thing-part.js";
 import { fields, materialModels } from "../server/schema.js";
@@ -13,6 +12,7 @@ import { schemaForm } from "../forms/schema-form.js";
 import { TextureSlot } from "../forms/texture-slot.js";
 import { TextureForm } from "../forms/texturing.js";
 import { inWords } from "../lib/format-text.js";
+import { OnDemand } from "../lib/on-demand.js";
 
 // The settings that stand open; the others are a click away. The picture's size has a form of its own.
 const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "adaptive", "denoise"];
@@ -37,12 +37,22 @@ export class Panel {
       view.filter(({ name }) => DISPLAY.includes(name)),
       "/view",
     );
-    this.table = new LookTable({
-      take: this.stage.takeTable,
-      remove: () => acts.putTable(),
-      nameOf: () => acts.state.chosen.tableFile,
-    });
-    find("view-form").append(this.table.element);
+    this.table = new OnDemand(
+      () => import("./look-table.js"),
+      ({ LookTable }) =>
+        new LookTable({
+          take: this.stage.takeTable,
+          remove: () => acts.putTable(),
+          nameOf: () => acts.state.chosen.tableFile,
+        }),
+      {
+        complain: acts.complain,
+        arrived: (table) => {
+          find("view-form").append(table.element);
+          table.show(acts.state.view.lut);
+        },
+      },
+    );
     const main = MAIN_SETTINGS.map((name) => settings.find((field) => field.name === name)).filter(Boolean);
     this.#forms.settings = this.#mount("settings", main, "/settings");
     this.#forms.more = this.#mount(
@@ -101,7 +111,8 @@ export class Panel {
     this.materialPanel.show(state);
     this.thingPart.show(state);
     this.#forms.view.show(view);
-    this.table.show(view.lut);
+    if (!this.find("film-part").hidden) this.table.get().catch(this.table.complain);
+    this.table.now?.show(view.lut);
     this.#forms.settings.show(settings, knobs);
     this.#forms.more.show(settings, knobs);
   }

@@ -2,7 +2,6 @@
 
 import { ball, box, isFlat, together } from "../document/bounds.js";
 import { axes, ray } from "../document/camera.js";
-import { drawContour } from "../document/contour.js";
 import { isOn } from "../document/outline.js";
 import { Picker } from "../document/picking.js";
 import { inWords } from "../lib/format-text.js";
@@ -61,9 +60,13 @@ export class Picks {
   }
 
   async #outline(scene, shape) {
+    const [{ drawContour }, layer] = await Promise.all([
+      import("../document/contour.js"),
+      this.picker.layer("shape_id", scene),
+    ]);
     drawContour(
       this.find("outline"),
-      await this.picker.layer("shape_id", scene),
+      layer,
       shape,
       getComputedStyle(this.find("stage")).getPropertyValue("--accent-bright"),
     );

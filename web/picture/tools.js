@@ -5,7 +5,7 @@ import { Handles } from "./handles.js";
 import { Inspector } from "./inspector.js";
 import { Markers } from "./markers.js";
 import { Picks } from "./picks.js";
-import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
+import { fitGuides, showLegend } from "./overlays.js";
 import { HANDLED } from "../document/ui-state.js";
 import { lampsOf } from "../document/lamps.js";
 import { Paced } from "../lib/paced.js";
@@ -75,7 +75,8 @@ export class Tools {
     if (histogram || clipping) this.#overlays.ask();
   }
 
-  #drawOverlays() {
+  async #drawOverlays() {
+    const { drawClipping, drawHistogram, showClipped } = await import("./histogram.js");
     const { histogram, clipping } = this.ui.state;
     const image = this.viewport.pixels();
     if (histogram) drawHistogram(this.find("histogram"), image);
