@@ -218,7 +218,11 @@ export class Shelf {
     this.shown.mark(this.#origins.get(scene.materials[chosen.material]) ?? null);
     this.environments.fill(
       [
-        { value: OWN, title: home.environment ? "The scene's own" : "The scene's own: none" },
+        {
+          value: OWN,
+          title: home.environment ? "The scene's own" : "The scene's own: none",
+          label: "Scene's own",
+        },
         { value: NONE, title: "None (black)", label: "None" },
         ...this.library.environments.map(({ name, title }) => ({ value: name, title })),
       ],
