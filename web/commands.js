@@ -105,6 +105,12 @@ export function makeCommands({
     showKeys: () => keySheet.get().then(() => find("keys-dialog").showModal(), complain),
     toggleOutline: () => find("toggle-outline").click(),
     renderPicture: finals.calls("render"),
+    // The first press shows the frame and the price, the next one renders; a double click is the first press alone.
+    pressRender({ detail }) {
+      if (ui.state.tab === "render") return detail < 2 && does.renderPicture();
+      ui.set({ tab: "render" });
+      return finals.calls("focus")();
+    },
     download: () => menus.get().then(({ exportMenu }) => exportMenu.png(), complain),
   };
   return {
@@ -118,7 +124,7 @@ export function makeCommands({
 // The command of each button, by the button's id.
 const BUTTONS = {
   pause: "togglePause",
-  render: "renderPicture",
+  render: "pressRender",
   compare: "toggleCompare",
   help: "showKeys",
   undo: "undo",
@@ -133,7 +139,7 @@ const BUTTONS = {
 };
 
 export function watchButtons(find, does) {
-  for (const [id, name] of Object.entries(BUTTONS)) find(id).addEventListener("click", () => does[name]());
+  for (const [id, name] of Object.entries(BUTTONS)) find(id).addEventListener("click", (event) => does[name](event));
 }
 
 const TOOLS = {

@@ -320,7 +320,7 @@ function push() {
   if (isCompared && !comparison.now) comparison.get().catch(complain);
   comparison.now?.show(isCompared ? wanted : null, page.isPaused);
   stream.show(wanted);
-  root.style.setProperty("--ratio", String(wanted.settings.width / wanted.settings.height));
+  controller.frameAs(page.frame, wanted.settings);
   root.classList.toggle("checker", page.isCheckered);
   find("compare").setAttribute("aria-pressed", String(isCompared));
   tellState();

@@ -5,10 +5,7 @@ import { visible } from "./outline.js";
 import { compared, rendered } from "./variants.js";
 import { inWords } from "../lib/format-text.js";
 import { defaults } from "../server/schema.js";
-import { DISPLAY, FINAL, contained, pictureSize, viewOf } from "./picture-view.js";
-
-// Pixels that a renderer traces fast enough to follow the hand.
-const AREA = { software: 512 * 512, hardware: 1920 * 1080 };
+import { DISPLAY, FINAL, contained, fillsBox, liveArea, pictureSize, viewOf } from "./picture-view.js";
 
 // JPEG quality of a picture that somebody paused to look at; else the server chooses (null), by whether it still changes.
 const PAUSED_QUALITY = 90;
@@ -60,35 +57,34 @@ export class PageState {
     return this.ui.state.checker ?? this.editor.state.scene.environment?.background === false;
   }
 
-  // The pixels of the picture on the page. While a final picture is prepared it has that one's shape, so that what will be
-  // in it is seen.
+  // The pixels of the picture on the page: all of the final frame is in it, whether that is prepared or not.
   get size() {
-    return this.#in(this.#chosenShape ?? (this.ui.state.tab === "render" ? FINAL : null));
+    const whole = this.windowSize;
+    const { frame } = this;
+    // The sides of the whole are not rounded again.
+    const isWhole = frame.width === whole.width && frame.height === whole.height;
+    const isFilled = fillsBox(this.root.getBoundingClientRect(), frame, this.editor.state.scene.camera);
+    return isWhole || isFilled ? whole : this.#sizeOf(frame);
   }
 
-  // What it would be if it filled its place, where no shape was chosen.
+  // What it would be if it filled its place.
   get windowSize() {
-    return this.#in(this.#chosenShape);
+    return this.#sizeOf(null);
   }
 
-  // The sides that were chosen, or null.
-  get #chosenShape() {
+  // The sides of the final picture.
+  get frame() {
     const { width, height } = this.editor.state.settings;
-    return width && height ? { width, height } : null;
+    if (width && height) return { width, height };
+    return FINAL.width * FINAL.height > this.info.limits.max_pixels ? this.windowSize : FINAL;
   }
 
-  // The pixels in a shape, or in the whole window, whose own sides are not rounded again.
-  #in(shape) {
-    const whole = this.#sizeOf(null);
-    const isWhole = !shape || (shape.width === whole.width && shape.height === whole.height);
-    return isWhole ? whole : this.#sizeOf(shape);
+  get isDenoised() {
+    return Boolean(this.editor.state.settings.denoise);
   }
 
   #sizeOf(shape) {
-    const area = Math.min(
-      this.info.renderer?.software === false ? AREA.hardware : AREA.software,
-      this.info.limits.max_pixels,
-    );
+    const area = Math.min(liveArea(this.info.renderer ?? {}, this.isDenoised), this.info.limits.max_pixels);
     const stageBox = this.root.getBoundingClientRect();
     const box = shape ? contained(stageBox, shape) : stageBox;
     // Those that are rendered at a time share what one may cost.

@@ -20,6 +20,18 @@ export function contained(box, { width, height }) {
   return { width: width * zoom, height: height * zoom };
 }
 
+// Whether the picture on the page is as wide as its box, in which the final frame is a part of it; else it has the
+// frame's shape. A field of view is that of the height: a wider picture shows more to both sides, and nothing less. A
+// panorama shows everything, whatever its shape is.
+export const fillsBox = (box, frame, { type }) =>
+  type !== "panorama" && frame.width * box.height <= box.width * frame.height;
+
+// Pixels that a renderer traces fast enough to follow the hand. What is denoised has use for more than noise has.
+export function liveArea({ software }, isDenoised) {
+  if (software === false) return 1920 * 1080;
+  return isDenoised ? 768 * 768 : 512 * 512;
+}
+
 const NEARBY = 16; // pixels less across that a picture may have
 
 // Sides in pixels of a picture that fills the box at the device's ratio, within an area.

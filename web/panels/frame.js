@@ -4,7 +4,10 @@ const ROOMY = matchMedia("(min-width: 75rem)"); // where the outline has room be
 const BESIDE = matchMedia("(min-aspect-ratio: 1/1) and (min-width: 56.01rem)"); // where it lies over nothing
 const LEAST = 360; // CSS pixels of the inspector
 const MOST = 520;
+const WIDE = 0.32; // of a wide window, what the inspector may have
 const STEP = 16;
+
+const most = () => Math.max(MOST, Math.round(WIDE * innerWidth));
 
 export class Frame {
   // `find(id)` elements, `ui` the interface's state.
@@ -20,9 +23,9 @@ export class Frame {
     ROOMY.addEventListener("change", () => ui.set({ outline: null }));
     const splitter = find("splitter");
     const width = () => find("panel").getBoundingClientRect().width;
-    const resize = (to) => ui.set({ inspector: Math.round(Math.min(MOST, Math.max(LEAST, to))) });
+    const resize = (to) => ui.set({ inspector: Math.round(Math.min(most(), Math.max(LEAST, to))) });
     splitter.setAttribute("aria-valuemin", String(LEAST));
-    splitter.setAttribute("aria-valuemax", String(MOST));
+    splitter.setAttribute("aria-valuemax", String(most()));
     splitter.addEventListener("pointerdown", (down) => {
       const before = width();
       splitter.setPointerCapture(down.pointerId);

@@ -1,4 +1,4 @@
-// What can be laid over the picture: the legend of a layer, guides.
+// What can be laid over the picture: the legend of a layer; and where that lies.
 
 import { element } from "../lib/dom.js";
 
@@ -20,11 +20,11 @@ export function showLegend(root, legend) {
   root.replaceChildren(...parts);
 }
 
-// The guides lie over the picture, not over the stage around it. The height of the picture in CSS pixels comes back.
-export function fitGuides(guides, stage, canvas) {
+// Has an element lie over the picture, not over the stage around it. The height of the picture in CSS pixels comes back.
+export function fitOverlay(overlay, stage, canvas) {
   const zoom = Math.min(stage.clientWidth / canvas.width, stage.clientHeight / canvas.height);
   const [w, h] = [canvas.width * zoom, canvas.height * zoom];
   const style = { width: w, height: h, left: (stage.clientWidth - w) / 2, top: (stage.clientHeight - h) / 2 };
-  for (const [name, value] of Object.entries(style)) guides.style.setProperty(name, `${value}px`);
+  for (const [name, value] of Object.entries(style)) overlay.style.setProperty(name, `${value}px`);
   return h;
 }

@@ -5,7 +5,7 @@ import { Handles } from "./handles.js";
 import { Inspector } from "./inspector.js";
 import { Markers } from "./markers.js";
 import { Picks } from "./picks.js";
-import { fitGuides, showLegend } from "./overlays.js";
+import { fitOverlay, showLegend } from "./overlays.js";
 import { HANDLED } from "../document/ui-state.js";
 import { lampsOf } from "../document/lamps.js";
 import { Paced } from "../lib/paced.js";
@@ -61,17 +61,16 @@ export class Tools {
     const isLight = lampsOf(scene).some(({ thing }) => thing === chosen.thing);
     const isOn =
       tool === "highlight" || ((isLight || /^\/(camera|environment)/.test(chosen.thing)) && tool !== "inspect");
-    const tall = fitGuides(this.find("markers"), this.root, this.viewport.canvas);
+    const tall = fitOverlay(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, aspect, tall, target);
-    const height = fitGuides(this.find("handles"), this.root, this.viewport.canvas);
+    const height = fitOverlay(this.find("handles"), this.root, this.viewport.canvas);
     this.axisViews.show();
     this.handles.show(HANDLED.includes(tool), aspect, height);
   }
 
   // Histogram and clipping follow the picture at their own pace.
   overlay() {
-    const { histogram, clipping, guides } = this.ui.state;
-    if (guides) fitGuides(this.find("guides"), this.root, this.viewport.canvas);
+    const { histogram, clipping } = this.ui.state;
     if (histogram || clipping) this.#overlays.ask();
   }
 

@@ -16,6 +16,7 @@ const EARLY = {
 
 export class ViewportController {
   #frame = {}; // the newest one on the canvas
+  #composed = 1; // the final frame's width by its height, as far as the picture on the page is wide
 
   // `find(id)` elements, `acts` the editor, `ui`, `stream`, `viewport`; `say(text)`, `complain(error)`.
   constructor(parts) {
@@ -58,9 +59,14 @@ export class ViewportController {
     };
     watchGestures(this.root, this.move, () => ui.state.tool);
     watchToolbar(find("tools"));
+    // The tools fade once a pointer has been there and is gone.
+    this.root.parentElement.addEventListener("pointerleave", ({ target }) => target.classList.add("left"));
+    const opener = find("open-tools");
+    opener.addEventListener("click", () => this.#openTools(opener.ariaExpanded !== "true"));
     find("tools").addEventListener("click", ({ target }) => {
       const tool = target.closest("[data-tool]")?.dataset.tool;
       if (!tool) return;
+      this.#openTools(false);
       ui.set({ tool });
       if (HANDLED.includes(tool)) this.root.focus(); // where the arrows are the tool's
     });
@@ -82,6 +88,19 @@ export class ViewportController {
     return width / height;
   }
 
+  // Where one button stands for the tools.
+  #openTools(isOpen) {
+    this.find("open-tools").setAttribute("aria-expanded", String(isOpen));
+  }
+
+  // Draws the final frame in the picture, by the sides of both.
+  frameAs(final, picture) {
+    const [ratio, frame] = [picture, final].map(({ width, height }) => width / height);
+    this.#composed = Math.min(ratio, frame);
+    this.root.style.setProperty("--ratio", String(ratio));
+    this.root.style.setProperty("--frame", String(this.#composed));
+  }
+
   // A quarter of what is seen: how large new things are.
   radius() {
     const { camera } = this.acts;
@@ -92,8 +111,11 @@ export class ViewportController {
   showUi(state) {
     const { tool } = state;
     this.root.dataset.tool = tool;
-    for (const button of this.find("tools").querySelectorAll("[data-tool]"))
-      button.setAttribute("aria-pressed", String(button.dataset.tool === tool));
+    for (const button of this.find("tools").querySelectorAll("[data-tool]")) {
+      const isHeld = button.dataset.tool === tool;
+      button.setAttribute("aria-pressed", String(isHeld));
+      if (isHeld) this.find("open-tools").replaceChildren(button.querySelector("svg").cloneNode(true));
+    }
     if (tool !== "orbit" && !this.tools.now) this.tools.get().catch(this.complain);
     this.tools.now?.showUi(state);
     this.mark();
@@ -171,7 +193,7 @@ export class ViewportController {
 
   // What of the camera has to change for a ball to fill the picture.
   framed(around) {
-    return frame(this.acts.camera, around, this.aspect);
+    return frame(this.acts.camera, around, this.#composed);
   }
 
   // Brings a thing into the middle; without one, everything that is not endless.

@@ -75,6 +75,11 @@ export class FinalPictures {
     this.#list();
   }
 
+  // Puts the hand on the button of the sheet.
+  focus() {
+    this.sheet.button.focus();
+  }
+
   // Renders what the button in the header says, and shows how far it is.
   render() {
     this.ui.set({ tab: "render" });
