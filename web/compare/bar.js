@@ -1,8 +1,10 @@
-// The bar of a comparison, above the picture: what stands at its sides, how both are compared, and what is found.
+// The bar of a comparison, one row over the picture's head: what stands at its sides, how both are compared, and what
+// can be done with them; and what is found.
 
-import { element } from "../lib/dom.js";
+import { element, freshId } from "../lib/dom.js";
 import { browse } from "../lib/files.js";
 import { inWords } from "../lib/format-text.js";
+import { drawn } from "../lib/icon.js";
 import { watchChoice } from "../lib/tabs.js";
 import { ASKED, GAINS, MODES, PHOTO, gainOf, modeOf, shows, sidesOf } from "../document/variants.js";
 import { Choices } from "./choices.js";
@@ -17,6 +19,20 @@ const STOPS = [
   ["temperature", "Temperature", 2, "Cold to warm: stops of red against blue, in linear light"],
   ["tint", "Tint", 1, "Green to magenta: stops, in linear light"],
 ];
+
+// Of each way to compare.
+const OUTLINES = {
+  swipe: "M1.5 2.5h13v11h-13zM3 4v8h5V4z",
+  beside: "M1.5 3h5.8v10H1.5zM8.7 3h5.8v10H8.7z",
+  difference:
+    "M5.8 3.2a4.8 4.8 0 1 1 0 9.600 4.800 4.800 0 0 1 0-9.600M10.200 3.200a4.800 4.800 0 1 1 0 9.600 4.800 4.800 0 0 1 0-9.600",
+  heat: "M8.3 1.200c.5 2.800 4.100 4.300 4.100 8.200a4.400 4.400 0 0 1-8.800 0c0-1.900 1-3.100 2-4 0 1.400.5 2.100 1.200 2.400-.3-2.600.2-4.900 1.500-6.600",
+  flip: "M8 3.500c3.200 0 5.600 2 6.800 4.500-1.200 2.500-3.600 4.500-6.800 4.500S2.400 10.500 1.200 8C2.400 5.500 4.800 3.500 8 3.500m0 1.800a2.700 2.700 0 1 0 0 5.400 2.700 2.700 0 0 0 0-5.400",
+  verdict:
+    "M8 1.500a6.500 6.500 0 1 1 0 13 6.500 6.500 0 0 1 0-13M4.300 8.300l2.600 2.700 4.900-5.100-1.100-1.100-3.800 4-1.500-1.600z",
+};
+const MORE =
+  "M2.500 6.700a1.300 1.300 0 1 1 0 2.600 1.300 1.300 0 0 1 0-2.600m5.500 0a1.300 1.300 0 1 1 0 2.600 1.300 1.300 0 0 1 0-2.600m5.500 0a1.300 1.300 0 1 1 0 2.600 1.300 1.300 0 0 1 0-2.600";
 
 const select = (label, change, ...options) =>
   element("select", { "aria-label": label, onchange: ({ target }) => change(target.value) }, ...options);
@@ -52,21 +68,21 @@ export class CompareBar {
     this.asks = button("Ask again", ask, { class: "button small asks" });
     const close = button("Done", () => acts.stopComparing(), { class: "button small close" });
     this.metric = element("p", { class: "metric", role: "status", "aria-label": "Verdict" });
+    // The mode stands between what is compared, drawn as its icon.
+    this.sign = drawn(OUTLINES.swipe);
+    this.mode = element("span", { class: "mode" }, this.sign, this.modes);
+    const often = element("div", { class: "often" }, this.signs, this.gains, this.asks, this.#edited(acts, models));
+    const further = element("div", { class: "further", id: freshId("further") }, often, this.#variants(acts));
     root.append(
       element(
         "div",
-        { class: "compare-top" },
-        element(
-          "div",
-          { class: "compare-row" },
-          this.left,
-          this.right,
-          this.modes,
-          this.signs,
-          this.gains,
-          this.asks,
-          this.#variants(acts, models),
-        ),
+        { class: "compare-row" },
+        this.left,
+        this.mode,
+        this.right,
+        this.#ways(choose),
+        this.#opener(further),
+        further,
         close,
       ),
       this.#photo(takePhoto, setPhoto),
@@ -74,8 +90,49 @@ export class CompareBar {
     );
   }
 
-  // What is done with the variants, where B is at a side.
-  #variants(acts, models) {
+  // The modes once more, side by side where there is room.
+  #ways(choose) {
+    this.ways = element(
+      "div",
+      { class: "ways", role: "radiogroup", "aria-label": "Ways to compare" },
+      ...Object.entries(MODES).map(([value, title]) =>
+        element(
+          "button",
+          { type: "button", role: "radio", class: "button icon", "data-value": value, "aria-label": title, title },
+          drawn(OUTLINES[value]),
+        ),
+      ),
+    );
+    this.markWay = watchChoice(this.ways, "button:enabled", ({ dataset }) => choose({ mode: dataset.value }));
+    return this.ways;
+  }
+
+  // The button of what is not in the row.
+  #opener(further) {
+    const opener = element(
+      "button",
+      {
+        type: "button",
+        class: "button icon more-of-it",
+        "aria-label": "More of the comparison",
+        "aria-controls": further.id,
+        "aria-expanded": "false",
+        onclick: () => open(opener.ariaExpanded !== "true"),
+      },
+      drawn(MORE),
+    );
+    const open = (is) => opener.setAttribute("aria-expanded", String(is));
+    this.root.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || opener.ariaExpanded !== "true") return;
+      event.stopPropagation();
+      open(false);
+      opener.focus();
+    });
+    return opener;
+  }
+
+  // Which variant is edited, and what B is, where that is at a side.
+  #edited(acts, models) {
     const radio = (name, title) =>
       element("button", { type: "button", role: "radio", class: "button small", "data-value": name }, title);
     const sides = element(
@@ -95,12 +152,16 @@ export class CompareBar {
       option("", "B as…"),
       ...models.map((name) => option(name, inWords(name))),
     );
+    this.edited = element("div", { class: "of-variants" }, sides, turn);
+    return this.edited;
+  }
+
+  // What is seldom done with the variants.
+  #variants(acts) {
     this.variants = element(
       "div",
-      { class: "of-variants" },
-      sides,
-      turn,
-      button("Swap", () => acts.swapVariants()),
+      { class: "of-variants seldom" },
+      button("Swap A and B", () => acts.swapVariants()),
       button("Discard B", () => acts.discardB(), { title: "Throws variant B away; Done keeps it" }),
     );
     return this.variants;
@@ -150,14 +211,23 @@ export class CompareBar {
     const isPhoto = shows(compare, PHOTO);
     this.choices.show(names, photograph?.name ?? "Photograph…");
     this.modes.value = mode;
+    this.mode.title = MODES[mode];
+    this.sign.firstChild.setAttribute("d", OUTLINES[mode]);
     for (const each of this.modes.options) each.disabled = isPhoto && ASKED.includes(each.value);
+    for (const each of this.ways.children) each.disabled = isPhoto && ASKED.includes(each.dataset.value);
+    this.markWay(({ dataset }) => dataset.value === mode);
+    for (const side of ["left", "right"]) this[side].dataset.shows = names[side];
     this.signs.hidden = mode !== "difference";
     this.signs.value = compare.isSigned ? "signed" : "absolute";
     this.gains.hidden = !["difference", "heat"].includes(mode);
     this.gains.value = String(gainOf(compare));
     this.asks.hidden = !ASKED.includes(mode);
     this.asks.textContent = isAsking ? "Stop" : "Ask again";
-    this.variants.hidden = !shows(compare, "b");
+    this.edited.hidden = this.variants.hidden = !shows(compare, "b");
+    this.root.dataset.further = [
+      ...(this.variants.hidden ? [] : ["variants"]),
+      ...(this.gains.hidden && this.asks.hidden ? [] : ["tuned"]),
+    ].join(" ");
     this.markSide(({ dataset }) => dataset.value === compare.side);
     this.photo.hidden = !isPhoto;
     for (const { name, range, reading } of this.stops) {

@@ -52,7 +52,7 @@ export class Comparison {
     });
     this.divider.addEventListener("input", () => this.#split());
     this.#watchDrops();
-    // The bar has a strip of its own above the picture.
+    // The tools are under it.
     new ResizeObserver(() => {
       document.documentElement.style.setProperty("--bar", `${this.root.offsetHeight}px`);
     }).observe(this.root);
@@ -266,6 +266,7 @@ export class Comparison {
     const sides = this.#sides;
     const missing = sides.find(({ header }) => !header);
     this.stage.classList.toggle("awaiting", Boolean(missing));
+    for (const { canvas, header } of sides) canvas.toggleAttribute("data-awaited", !header);
     const isBetween = BETWEEN.includes(this.#mode);
     if (isBetween || this.#mode === "flip") {
       put("left", [isBetween ? `${MODES[this.#mode]} ×${gainOf(this.#compared)}` : MODES.flip]);

@@ -21,12 +21,15 @@ const ICONS = {
   mesh: "M8 1.5 14.5 14h-13zM8 5.2 4.3 12.4h7.4z",
 };
 
-export function icon(name) {
+export const icon = (name) => drawn(ICONS[name] ?? ICONS.mesh);
+
+// One of another outline, in a square of 16.
+export function drawn(outline) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
   svg.setAttribute("viewBox", "0 0 16 16");
   svg.setAttribute("aria-hidden", "true");
-  path.setAttribute("d", ICONS[name] ?? ICONS.mesh);
+  path.setAttribute("d", outline);
   path.setAttribute("fill-rule", "evenodd");
   svg.append(path);
   return svg;
