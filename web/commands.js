@@ -107,8 +107,9 @@ export function makeCommands({
     renderPicture: finals.calls("render"),
     // The first press shows the frame and the price, the next one renders; a double click is the first press alone.
     pressRender({ detail }) {
-      if (ui.state.tab === "render") return detail < 2 && does.renderPicture();
-      ui.set({ tab: "render" });
+      const isShown = ui.state.tab === "render";
+      if (isShown && detail < 2) return does.renderPicture();
+      if (!isShown) ui.set({ tab: "render" });
       return finals.calls("focus")();
     },
     download: () => menus.get().then(({ exportMenu }) => exportMenu.png(), complain),

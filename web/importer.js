@@ -128,7 +128,7 @@ export class Importer {
   }
 
   async #takeMaterials({ id }, file, at) {
-    const { collected, placed, thingFor } = await import("./texture-set.js");
+    const { collected, heading, placed, thingFor } = await import("./texture-set.js");
     const { warnings, ...set } = await fetchAssetMaterials(id);
     const materials = unpacked(set);
     const thing = await thingFor(at, { controller: this.controller, state: this.acts.state });
@@ -139,8 +139,7 @@ export class Importer {
       return placed(each, Object.fromEntries(known.map(({ name, title }) => [name, title])), isOne);
     });
     const left = warnings.map(({ pointer: image, detail }) => `${image}: ${detail}.`);
-    const what = isOne ? `is the material ${materials[0].name}.` : `are ${materials.length} materials.`;
-    this.messages.show("import", { title: `${file.name} ${what}`, list: [...lines, ...left] });
+    this.messages.show("import", { title: heading(materials, warnings), list: [...lines, ...left] });
     return false;
   }
 

@@ -3,7 +3,7 @@
 import { dressed } from "./document/dressing.js";
 import { received, withTextures } from "./document/material-set.js";
 import { fresh } from "./document/materials.js";
-import { inWords } from "./lib/format-text.js";
+import { amount, inWords } from "./lib/format-text.js";
 import { pointer } from "./lib/patch.js";
 
 // The state with all of these materials: the first on the thing, the others, and without a thing all of them, on the
@@ -23,6 +23,17 @@ export function collected(state, thing, materials) {
 }
 
 const alone = ({ name, material, textures }) => ({ materials: { [name]: material }, textures });
+
+// "Moss: 3 images, AO left out": a set in one line.
+export function heading(materials, warnings) {
+  const name = materials.length === 1 ? materials[0].name : amount(materials.length, "material");
+  const textures = materials.flatMap((each) => Object.values(each.material).map((value) => value?.texture));
+  const images = new Set(textures.filter(Boolean)).size;
+  const left = warnings.filter(({ detail }) => detail.includes("left out"));
+  const others = left.filter(({ detail }) => !detail.startsWith("ambient occlusion"));
+  const parts = [...(others.length < left.length ? ["AO"] : []), ...(others.length ? [amount(others.length, "file")] : [])];
+  return `${name}: ${images ? amount(images, "image") : "no images"}${parts.length ? `, ${parts.join(" and ")} left out` : ""}`;
+}
 
 // What went where: a line for each parameter that shows an image.
 export function placed({ name, material }, titles, isOne) {

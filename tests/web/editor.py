@@ -166,6 +166,14 @@ class Editor:
         click = "all => { all.forEach((each) => each.click()); return all.length === 0; }"
         self.wait("the parts to open", lambda: self.page.locator(shut).evaluate_all(click))
 
+    def compare(self) -> None:
+        """Begin to compare, with all of the bar open: where it is narrow, one button has the rest of it."""
+        self.page.click("#compare")
+        self.page.wait_for_selector("#comparison .close", state="visible")
+        rest = self.page.locator("#comparison .more-of-it")
+        if rest.is_visible() and rest.get_attribute("aria-expanded") == "false":
+            rest.click()
+
     def pick(self, shelf: str, value: str) -> None:
         """Choose a picture on the shelf: of the scene's "materials", the "library", "environments" or "scenes"."""
         self.page.click(f"#tab-{'materials' if shelf == 'library' else shelf}")

@@ -92,8 +92,7 @@ def test_a_render_lies_on_the_picture_and_a_link_keeps_it(editor: Editor, server
     assert side(editor, "Left").input_value() == "a" and side(editor, "Right").input_value() == f"render {id}"
     assert page.is_hidden("#editing") and page.is_hidden("#comparison >> text=Discard B"), "B is not to be seen"
     editor.wait("its pixels", lambda: half(editor, "right").max() > 0)
-    # The picture begins again at the size that the sheet leaves it: until then it has samples, and lies elsewhere.
-    # Each half takes the new size as it is drawn.
+    # Each half takes the size that it has beside the other as it is drawn.
     editor.wait("one size", lambda: half(editor, "left").shape == half(editor, "right").shape)
     editor.wait("both alike", lambda: np.abs(coarse(half(editor, "left")) - coarse(half(editor, "right"))).max() < 6)
 
@@ -115,14 +114,11 @@ def test_a_render_lies_on_the_picture_and_a_link_keeps_it(editor: Editor, server
 def test_a_snapshot_is_compared_with_what_came_of_it(editor: Editor) -> None:
     page = editor.page
     finish(editor, 4)
-    page.click("#tab-properties")  # beside the sheet Render the picture has the final one's shape
-    editor.rest("its size", lambda: page.evaluate("[picture.width, picture.height]"))
-    editor.wait("the end", lambda: editor.text("#state") == "Done")
     before = overlay(editor, "picture")[..., :3].astype(float)
     page.locator("#stage").press("n")
     editor.wait("it", lambda: "Snapshot taken" in (page.text_content("#announcer") or ""))
     page.click("#library [data-value=gold]")
-    page.click("#compare")
+    editor.compare()
     choose(editor, "Left", "snapshot")
     assert side(editor, "Right").input_value() == "b"
     choose(editor, "Right", "a")
@@ -148,7 +144,7 @@ def test_a_snapshot_is_compared_with_what_came_of_it(editor: Editor) -> None:
 def test_a_photograph_is_fitted_by_hand_in_linear_light(editor: Editor) -> None:
     page = editor.page
     editor.settled()
-    page.click("#compare")
+    editor.compare()
     side(editor, "Right").select_option("Photograph…")
     awaited = "Photograph is not chosen yet"
     editor.wait("a place for it", lambda: page.get_by_role("status", name="Verdict").inner_text() == awaited)
@@ -240,7 +236,7 @@ def verdict(editor: Editor) -> str:
 def test_the_server_says_whether_two_differ(editor: Editor, server: Server) -> None:
     page = editor.page
     finish(editor, 16)
-    page.click("#compare")
+    editor.compare()
     way(editor, "Verdict")
     editor.wait("the verdict on a copy", lambda: verdict(editor).startswith("The same within noise"))
     assert not overlay(editor, "difference").any(), "the pictures are to be seen"
@@ -275,7 +271,7 @@ def test_the_server_says_whether_two_differ(editor: Editor, server: Server) -> N
 def test_who_edits_or_leaves_ends_the_comparison(editor: Editor) -> None:
     page = editor.page
     editor.settled()
-    page.click("#compare")
+    editor.compare()
     held: list[Any] = []
     ended: list[str] = []
     page.route("**/v1/compare*", lambda route: held.append(route))

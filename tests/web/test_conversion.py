@@ -112,7 +112,7 @@ def test_variant_b_becomes_openpbr_with_its_groups_and_lobes(editor: Editor) -> 
     page.evaluate("(text) => { navigator.clipboard.readText = async () => text; }", json.dumps(material))
     editor.act("paste-material")
     editor.settled()
-    page.click("#compare")
+    editor.compare()
     editor.wait("the bar", lambda: page.is_visible("#comparison"))
     turn = "#comparison select[aria-label^=Turn]"
     assert "OpenPBR" in page.inner_text(turn)

@@ -158,7 +158,7 @@ def test_narrow_bars_clip_no_word(at: Editor, others: list[tuple[int, int]]) -> 
 
 @pytest.mark.parametrize("at", [PHONE], indirect=True)
 def test_a_phone_gives_its_picture_room_and_lists_gestures_first(at: Editor) -> None:
-    """And a message does not hide the field in hand."""
+    """And a message hides neither the field in hand nor the button of the tools."""
     page = at.page
     box = at.field("roughness", "number")
     page.evaluate("(place) => document.querySelector(place).scrollIntoView({ block: 'end' })", box)
@@ -168,8 +168,9 @@ def test_a_phone_gives_its_picture_room_and_lists_gestures_first(at: Editor) -> 
         new Messages(document.getElementById("messages"), () => [])
             .show("import", { title: "duck.glb: not all of it was taken." });
     }""")
-    (field, shown) = (page.locator(each).bounding_box() for each in (box, "#messages"))
-    assert field and shown and field["y"] + field["height"] <= shown["y"]
+    (shown, opener, field) = (page.locator(each).bounding_box() for each in ("#messages", "#open-tools", box))
+    assert field and shown and opener
+    assert opener["y"] + opener["height"] <= shown["y"] and shown["y"] + shown["height"] <= field["y"]
     page.evaluate("document.getElementById('messages').replaceChildren()")
     page.evaluate("document.activeElement.blur()")
 

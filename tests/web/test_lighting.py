@@ -18,6 +18,7 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.drop("#stage", {"lit.glb": start_up(BLENDER_LAMP).glb()})
     editor.page.click("dialog[open] [value=open]")
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
+    editor.page.click("#messages summary")  # it stays while that is open
     assert "exposure is -10 stops now" in editor.text("#messages") and "no sky" in editor.text("#messages")
     editor.tab("film")
     exposure = editor.page.locator(editor.field("exposure", "number"))
@@ -60,7 +61,7 @@ def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
     editor.drop("#stage", {"lit.glb": file.glb()})
     editor.page.click("dialog[open] [value=open]")
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
-    said = editor.page.locator("#messages li").all_inner_texts()
+    said = editor.page.locator("#messages li").all_text_contents()
     assert any(line.startswith("The animation is left out: it ") for line in said), said
     assert "Material 2: the occlusion texture is not used; occlusion is traced" in said, said
     assert all(line[0].isupper() for line in said), said

@@ -177,7 +177,7 @@ def test_glass_is_seen_on_both_sides(lobe: Editor) -> None:
 def test_both_variants_are_drawn_over_each_other(lobe: Editor) -> None:
     page = lobe.page
     paste(lobe, {"type": "principled", "roughness": 0.3})
-    page.click("#compare")
+    lobe.compare()
     page.select_option("#comparison select[aria-label^=Turn]", "disney")
     plotted(lobe)
     both = ["A, Principled", "B, Disney"]  # B begins as a copy of A
@@ -299,7 +299,7 @@ def test_lobes_are_drawn_apart(lobe: Editor) -> None:
     for row in rows:
         parts = sum(row[f"f_{name}_g"] for name in legend[1:])
         assert parts == pytest.approx(row["f_g"], rel=1e-4, abs=1e-7)
-    page.click("#compare")
+    lobe.compare()
     page.select_option("#comparison select[aria-label^=Turn]", "metal_rough")
     lobe.wait("those of both", lambda: page.locator("#lobe .curve.b[class*=lobe-]").count() == 2)
     assert {"A_f_clearcoat_r", "B_f_specular_r"} <= table(lobe)[0].keys()

@@ -65,6 +65,13 @@ def download(editor: Editor, item: Locator, button: str) -> tuple[str, bytes]:
     return waiting.value.suggested_filename, waiting.value.path().read_bytes()
 
 
+def drawn(page: Page) -> float:
+    """Width by height of the final frame's line over the picture."""
+    frame = page.locator(".framing .final").bounding_box()
+    assert frame is not None
+    return frame["width"] / frame["height"]
+
+
 def plain(text: str) -> str:
     return text.replace("\u202f", " ").replace("\u00a0", " ")
 
@@ -75,19 +82,21 @@ def test_a_picture_is_rendered_in_any_size_and_saved(editor: Editor) -> None:
     assert size(editor) == [1920, 1080], "unless somebody says otherwise"
     ratio = "picture.width / picture.height"
     editor.wait("what will be in it", lambda: page.evaluate(ratio) == pytest.approx(16 / 9, 0.02))
+    stage_ratio = page.evaluate("stage.clientWidth / stage.clientHeight")
     picker = page.get_by_label("Size", exact=True)
     picker.select_option("As the window")
     editor.wait("its size", lambda: size(editor) == page.evaluate("[picture.width, picture.height]"))
-    assert page.evaluate(ratio) == pytest.approx(page.evaluate("stage.clientWidth / stage.clientHeight"), 0.02)
+    assert page.evaluate(ratio) == pytest.approx(stage_ratio, 0.02) and drawn(page) == pytest.approx(
+        stage_ratio, 0.02
+    )
     picker.select_option("HD, 1920 × 1080".replace(" × ", "\u202f×\u202f"))
     assert page.get_by_role("button", name="Render 1920×1080", exact=True).is_visible()
     assert "1920 × 1080, Clean in about" in plain(str(page.get_attribute("#render", "title")))
     picker.select_option("Shape 2 : 3")
     write(editor, "Width", 64)
     assert size(editor) == [64, 96], "the shape stays"
-    editor.wait(
-        "the shape on screen", lambda: page.evaluate("picture.width / picture.height") == pytest.approx(2 / 3, 0.02)
-    )
+    assert drawn(page) == pytest.approx(2 / 3, 0.02)
+    editor.wait("a picture around it", lambda: page.evaluate(ratio) == pytest.approx(stage_ratio, 0.02))
     picker.select_option("Custom")
     item = order(editor, 1)
     editor.wait("the end", is_done(item))
@@ -273,6 +282,30 @@ def test_a_table_of_colours_is_dropped_saved_and_removed(editor: Editor) -> None
     editor.drop("#stage", {"Broken.cube": b"LUT_1D_SIZE 2\n1 1\n"})
     editor.wait("a word about it", lambda: "Broken.cube was not taken" in page.inner_text("#messages"))
     assert chip.inner_text() == "Inverted.cube", "the last good one stays"
+
+
+def test_the_first_press_shows_the_frame_and_the_second_one_renders(editor: Editor) -> None:
+    """And what is seen of the scene stays as it is; a double click is the first press alone."""
+    page = editor.page
+    editor.settled()
+    size = page.evaluate("[picture.width, picture.height]")
+    samples, sent = editor.samples(), list[Route]()
+    page.route(
+        "**/v1/renders", lambda route: sent.append(route) if route.request.method == "POST" else route.continue_()
+    )
+    head = page.locator("#render")
+    bright = """() => [...document.querySelectorAll(".button.primary")].filter((each) => each.checkVisibility()
+        && getComputedStyle(each).backgroundColor === "rgb(255, 182, 39)").map((each) => each.textContent)"""
+    assert [text.split()[0] for text in page.evaluate(bright)] == ["Render"]
+    head.dblclick()
+    sheet = page.get_by_role("button", name="Render picture")
+    editor.wait("the hand on its button", lambda: sheet.evaluate("(each) => each === document.activeElement"))
+    assert page.evaluate(bright) == ["Render picture"], "one at a time"
+    assert sheet.get_attribute("aria-describedby") and page.is_visible("#output .quality .price")
+    editor.wait("samples", lambda: editor.samples() > samples)  # of the same picture: nothing has begun anew
+    assert page.evaluate("[picture.width, picture.height]") == size and not sent
+    page.keyboard.press("Enter")
+    editor.wait("the render", lambda: len(sent) == 1)
 
 
 def test_a_button_that_is_pressed_twice_renders_once(editor: Editor) -> None:

@@ -109,8 +109,8 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
     editor.drop("#stage", {"sail.glb": model()})
     page.click("dialog[open] [value=add]")
     editor.wait("the square", lambda: things.count() == 3)
-    assert "Its light was left out" in editor.text("#messages")
-    assert "sky" not in editor.text("#messages"), "that concerns who opens it"
+    said = page.text_content("#messages") or ""
+    assert "Its light was left out" in said and "sky" not in said, "that concerns who opens it"
     before = document(editor)
     assert list(before["materials"]) == ["subject", "floor", "subject-2"]
     assert before["shapes"][2]["material"] == "subject-2" and "lights" not in before
@@ -129,8 +129,8 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
     editor.wait("the model on a ground, and nothing else", lambda: things.count() == 2)
     names = "the stage's name"
     editor.wait(names, lambda: document(editor)["shapes"][1].get("name") == "Stage")
-    editor.wait("what is said of it", lambda: "sky" in editor.text("#messages"))
-    assert "wide" not in editor.text("#messages"), "the picture is as wide as the window in any case"
+    editor.wait("what is said of it", lambda: "sky" in (page.text_content("#messages") or ""))
+    assert "wide" not in (page.text_content("#messages") or ""), "the picture is as wide as the window in any case"
     with page.expect_file_chooser() as asked:
         editor.tab("save")
         page.click("#add-file")

@@ -24,7 +24,7 @@ def metric(editor: Editor) -> float:
 
 def test_a_b(editor: Editor) -> None:
     editor.settled()
-    editor.page.click("#compare")
+    editor.compare()
     editor.wait("equal variants", lambda: metric(editor) < 3)
     editor.page.select_option("#comparison select[aria-label^=Turn]", "blinn_phong")
     editor.wait("a difference", lambda: metric(editor) > 4)
@@ -60,7 +60,7 @@ def test_a_b(editor: Editor) -> None:
 def test_b_stays_until_it_is_thrown_away(editor: Editor) -> None:
     page = editor.page
     editor.settled()
-    page.click("#compare")
+    editor.compare()
     page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
     editor.wait("B", lambda: "Diffuse" in editor.text(".variant.b"))
     page.click("#comparison [data-value=b]")
@@ -68,12 +68,12 @@ def test_b_stays_until_it_is_thrown_away(editor: Editor) -> None:
     assert page.input_value("#model") == "diffuse"
     page.click("#comparison >> text=Done")
     assert page.is_hidden("#editing") and page.input_value("#model") == "principled"
-    page.click("#compare")
+    editor.compare()
     assert "Diffuse" in editor.text(".variant.b"), "Done kept it"
     assert page.get_by_role("heading", name="Editing A").is_visible()
     page.click("#comparison >> text=Discard B")
     assert page.is_hidden("#comparison")
-    page.click("#compare")
+    editor.compare()
     assert "Principled" in editor.text(".variant.b"), "a copy of A"
 
 
@@ -82,12 +82,12 @@ def test_b_is_awaited_in_words_and_a_link_keeps_the_way_of_comparing(editor: Edi
     page = editor.page
     editor.settled()
     page.evaluate("() => { window.WebSocket = class { static OPEN = 1; static CLOSED = 3; send() {} close() {} }; }")
-    page.click("#compare")
+    editor.compare()
     page.select_option(WAY, "difference")
     page.select_option("#comparison [aria-label^='How much']", "16")
     awaited = "B · Principled · waiting for its first frame"
     assert page.locator(".variant").all_text_contents() == ["Difference ×16", awaited]
-    assert not overlay(editor, "difference").any() and page.is_visible("#difference"), "opaque and empty"
+    assert page.is_hidden("#difference") and page.is_hidden("#picture-b"), "A is there, and stays"
     page.select_option(WAY, "swipe")
     assert page.locator(".variant.b").text_content() == awaited
     assert page.get_by_role("status", name="Verdict").inner_text() == "B is waiting for its first frame"
@@ -104,8 +104,7 @@ def test_b_is_awaited_in_words_and_a_link_keeps_the_way_of_comparing(editor: Edi
 
 def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     finish(editor, 4)
-    editor.page.click("#tab-properties")  # beside the sheet Render the picture has the final one's shape
-    editor.page.click("#compare")
+    editor.compare()
     editor.page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
     labels = editor.page.locator(".variant")
     both = ["A · Principled · 4 samples", "B · Diffuse · 4 samples"]
@@ -128,7 +127,7 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     heat = np.clip(3 * 16 * np.abs(a - b).max(-1)[..., None] - [0, 255, 510], 0, 255)
     editor.wait("the heat", lambda: np.array_equal(overlay(editor, "difference")[..., :3], heat))
 
-    whole = editor.page.evaluate("stage.clientWidth / stage.clientHeight")
+    whole = a.shape[1] / a.shape[0]
     editor.page.select_option(WAY, "beside")
     aspect = "document.getElementById('picture').width / document.getElementById('picture').height"
     editor.wait("half the size", lambda: editor.page.evaluate("picture.width") < 0.9 * a.shape[1])
