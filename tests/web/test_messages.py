@@ -36,6 +36,35 @@ def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
     assert said.startswith("“shine” of material Subject is not known here") and len(said) < 80
 
 
+def test_the_newest_message_is_seen_and_goes_by_itself(editor: Editor) -> None:
+    """Where nobody reads it; a refusal stays, and what lasts is seen again."""
+    page = editor.page
+    page.evaluate("""async () => {
+        const { Messages } = await import(new URL("panels/messages.js", location));
+        window.told = new Messages(document.getElementById("messages"), () => [], 300);
+        const list = ["Base colour: oak_diff", "Roughness: oak_rough"];
+        told.show("upload", { title: "Sending oak.zip", lasting: true, progress: true });
+        told.show("share", { title: "The link is copied." });
+        told.show("import", { title: "oak: 2 images", list });
+    }""")
+    seen = "[...document.querySelectorAll('.message')].filter((each) => each.checkVisibility()).length"
+    assert page.evaluate(seen) == 1 and editor.text("#messages strong") == "oak: 2 images"
+    assert page.locator(".message.share").count() == 0, "the newest replaces what would go by itself"
+    assert "Roughness" not in editor.text("#messages"), "a list is one line until somebody wants it"
+    page.click("#messages summary")
+    page.mouse.move(0, 0)
+    page.wait_for_timeout(1600)
+    assert "Roughness: oak_rough" in editor.text("#messages"), "and stays while it is read"
+    page.click("#messages summary")
+    page.evaluate("document.activeElement.blur()")
+    page.mouse.move(0, 0)
+    editor.wait("the one that lasts", lambda: editor.text("#messages").startswith("Sending oak.zip"))
+    page.evaluate("told.hide('upload'); told.show('refusal', { title: 'oak.zip was not taken.' })")
+    page.wait_for_timeout(600)
+    assert editor.text("#messages strong") == "oak.zip was not taken."
+    page.evaluate("told.hide('refusal')")
+
+
 def test_no_answer_is_told_in_words(editor: Editor) -> None:
     def fail(route: Route) -> None:
         route.abort()

@@ -121,6 +121,19 @@ def test_the_picture_fills_its_box_within_an_area(page: Page) -> None:
     }
 
 
+def test_the_final_frame_is_always_in_the_picture(page: Page) -> None:
+    stage, camera = {"width": 866, "height": 727}, {"type": "perspective"}
+    for width, height, is_whole in ((1920, 1080, False), (866, 727, True), (1080, 1080, True), (1080, 1920, True)):
+        frame = {"width": width, "height": height}
+        assert call(page, "document/picture-view.js", "fillsBox", stage, frame, camera) is is_whole, frame
+    assert not call(page, "document/picture-view.js", "fillsBox", stage, stage, {"type": "panorama"})
+    areas = [
+        call(page, "document/picture-view.js", "liveArea", {"software": software}, denoised)
+        for software, denoised in ((True, False), (True, True), (False, False))
+    ]
+    assert areas == [512 * 512, 768 * 768, 1920 * 1080]
+
+
 def test_a_preset_costs_what_this_scene_takes_and_before_that_what_the_list_says(page: Page) -> None:
     cost = {
         "seconds": 24.0, "noise": 0.039, "size": 512, "missing_light": 0.0004,

@@ -44,7 +44,7 @@ export class Messages {
     const bar = progress ? element("progress", { max: "1", value: "0", "aria-label": title }) : null;
     const node = element("div", { class: `message ${kind}` }, text, bar, button, close);
     this.#shown.set(kind, { node, isLasting: lasting, about: lasting ? [] : this.about(kind) });
-    this.root.append(node);
+    this.root.prepend(node);
     if (!lasting && !below && kind !== "refusal") this.#leave(kind, node, this.brief_ms);
     return (share) => {
       if (bar) bar.value = share;
