@@ -95,7 +95,10 @@ export class Comparison {
     this.#arrange(isOn ? sidesOf(this.#compared) : {});
     this.divider.hidden = !isOn || !SPLIT.includes(this.#mode);
     this.difference.hidden = !isOn || ![...BETWEEN, ...ASKED].includes(this.#mode);
-    if (!isOn) return this.question.forget();
+    if (!isOn) {
+      this.stage.classList.remove("awaiting");
+      return this.question.forget();
+    }
     this.#split();
     for (const side of this.#open.values()) side.show(wanted, paused);
     this.#consult();
