@@ -79,8 +79,9 @@ export class PageState {
     return FINAL.width * FINAL.height > this.info.limits.max_pixels ? this.windowSize : FINAL;
   }
 
+  // Whether colour is seen denoised. Its size is that of the other layers, which must not begin anew.
   get isDenoised() {
-    return Boolean(this.editor.state.settings.denoise);
+    return Boolean(this.ui.state.denoised || this.editor.state.settings.denoise);
   }
 
   #sizeOf(shape) {
