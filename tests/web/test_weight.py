@@ -17,7 +17,7 @@ FIRST_PICTURE = """performance.getEntriesByName("first picture")[0].startTime"""
 MOST_BEFORE_THE_PICTURE = 200_000
 MOST = 300_000
 # What a hand needs only once there is a picture, one file of each part.
-LATER = ("final-pictures.js", "importer.js", "adding.js", "header.js", "tools.js", "renders.css")
+LATER = ("final-pictures.js", "importer.js", "adding.js", "header.js", "tools.js", "tools.css", "renders.css")
 
 
 @pytest.mark.usefixtures("editor")  # after that the server has its kernel: this visit waits for the network alone

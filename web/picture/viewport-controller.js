@@ -4,7 +4,7 @@ import { axes, frame, halfHeight } from "../document/camera.js";
 import { watchGestures } from "./gestures.js";
 import { NotReady } from "../server/stream.js";
 import { watchToolbar } from "../lib/tabs.js";
-import { OnDemand } from "../lib/on-demand.js";
+import { OnDemand, useSheet } from "../lib/on-demand.js";
 import { HANDLED } from "../document/ui-state.js";
 
 // A click before there is a picture.
@@ -24,7 +24,7 @@ export class ViewportController {
     const { find, acts, ui } = parts;
     this.root = find("stage");
     this.tools = new OnDemand(
-      () => import("./tools.js"),
+      async () => (await Promise.all([import("./tools.js"), useSheet("tools.css")]))[0],
       ({ Tools }) => new Tools(this),
       {
         complain: parts.complain,
