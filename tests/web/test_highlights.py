@@ -52,7 +52,7 @@ def paste(editor: Editor, scene: Any) -> None:
 def at(editor: Editor, right: float, up: float) -> tuple[float, float]:
     """On the page: a place of the picture, from its middle, in its heights."""
     x, y = point(editor, 0.5, 0.5)
-    box = editor.page.locator("#stage").bounding_box()
+    box = editor.page.locator(".framing").bounding_box()
     assert box is not None
     return x + right * box["height"], y - up * box["height"]
 
