@@ -41,7 +41,7 @@ def test_the_newest_message_is_seen_and_goes_by_itself(editor: Editor) -> None:
     page = editor.page
     page.evaluate("""async () => {
         const { Messages } = await import(new URL("panels/messages.js", location));
-        window.told = new Messages(document.getElementById("messages"), () => [], 300);
+        window.told = new Messages(document.getElementById("messages"), () => [], 3000);
         const list = ["Base colour: oak_diff", "Roughness: oak_rough"];
         told.show("upload", { title: "Sending oak.zip", lasting: true, progress: true });
         told.show("share", { title: "The link is copied." });
@@ -53,14 +53,14 @@ def test_the_newest_message_is_seen_and_goes_by_itself(editor: Editor) -> None:
     assert "Roughness" not in editor.text("#messages"), "a list is one line until somebody wants it"
     page.click("#messages summary")
     page.mouse.move(0, 0)
-    page.wait_for_timeout(1600)
+    page.wait_for_timeout(3500)
     assert "Roughness: oak_rough" in editor.text("#messages"), "and stays while it is read"
     page.click("#messages summary")
     page.evaluate("document.activeElement.blur()")
     page.mouse.move(0, 0)
     editor.wait("the one that lasts", lambda: editor.text("#messages").startswith("Sending oak.zip"))
     page.evaluate("told.hide('upload'); told.show('refusal', { title: 'oak.zip was not taken.' })")
-    page.wait_for_timeout(600)
+    page.wait_for_timeout(3500)
     assert editor.text("#messages strong") == "oak.zip was not taken."
     page.evaluate("told.hide('refusal')")
 
