@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable
 from functools import cache
 
-from service.presets import cyclorama, knot, shader_ball, skies, studio
+from service.presets import armchair, bottle, candle, car_panel, cloth, cyclorama, glassware, knot, orange, shader_ball, skies, studio, tree, watch
 
 ASSETS: dict[str, Callable[[], bytes]] = {
     "studio": studio.studio,
@@ -18,6 +18,40 @@ ASSETS: dict[str, Callable[[], bytes]] = {
     "shader-ball": shader_ball.shader_ball,
     "shader-ball-stand": shader_ball.stand,
     "cyclorama": cyclorama.cyclorama,
+    "night-studio": studio.night_studio,
+    "tumbler": glassware.tumbler,
+    "whisky": glassware.whisky,
+    "water-glass": glassware.water_glass,
+    "water": glassware.water,
+    "ice": glassware.ice,
+    "wax": candle.wax,
+    "flame": candle.flame,
+    "flame-foot": candle.flame_foot,
+    "plate": candle.plate,
+    "linen-cloth": cloth.linen_cloth,
+    "linen-weave": cloth.linen_weave,
+    "perfume-bottle": bottle.bottle,
+    "perfume-collar": bottle.collar,
+    "perfume-cap": bottle.cap,
+    "orange": orange.orange,
+    "orange-half": orange.half,
+    "orange-slice": orange.slice_,
+    "orange-leaf": orange.leaf,
+    "car-door": car_panel.door,
+    "car-fender": car_panel.fender,
+    "chair-cushion": armchair.cushion,
+    "chair-back": armchair.back,
+    "chair-buttons": armchair.buttons,
+    "chair-arm": armchair.arm,
+    "chair-pillow": armchair.pillow,
+    "chair-leg": armchair.leg,
+    "bare-tree": tree.bare_tree,
+    "watch-case": watch.case,
+    "watch-markers": watch.markers,
+    "watch-hands": watch.hands,
+    "watch-crown": watch.crown,
+    "watch-strap": watch.strap,
+    "watch-stitches": watch.stitches,
 }
 
 

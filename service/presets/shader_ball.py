@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from service.presets import ply
+from service.presets.mesh import Curve, Mesh
 
 CENTER = 0.98  # metres above the floor
 OUTER, INNER = 0.8, 0.67  # radii of the shells
@@ -23,12 +23,10 @@ CUT = (-12.0, 80.0)  # degrees from +Z to +X, which are cut out
 AROUND, ALONG = 64, 8  # steps of a full turn, and of a quarter circle
 ROUND = 2  # steps of an edge
 
-Curve = tuple[np.ndarray, np.ndarray]  # points and outward unit normals (n, 2)
-
 
 def shader_ball() -> bytes:
     """A binary PLY with vertex normals and texture coordinates; it stands on the stand."""
-    mesh = _Mesh()
+    mesh = Mesh()
     gap = math.degrees((SEAM / 2) / OUTER)
     _shell(mesh, HOLE, 90 - gap, CUT)
     _shell(mesh, 90 + gap, 166, None)
@@ -38,37 +36,9 @@ def shader_ball() -> bytes:
 
 def stand() -> bytes:
     """A binary PLY like that of the ball; its lowest point lies 2 mm above y = 0."""
-    mesh = _Mesh()
+    mesh = Mesh()
     _slab(mesh)
     return mesh.file()
-
-
-class _Mesh:
-    """Grids of vertices, joined to triangles that face the way that their normals do."""
-
-    def __init__(self) -> None:
-        self._vertices: list[np.ndarray] = []
-        self._faces: list[np.ndarray] = []
-        self._count = 0
-
-    def add(self, points: np.ndarray, normals: np.ndarray, uvs: np.ndarray) -> None:
-        """A grid (m, n, 3) with texture coordinates (m, n, 2)."""
-        m, n = points.shape[:2]
-        corner = np.arange(m * n).reshape(m, n)
-        a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-        faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-        flat, up = points.reshape(-1, 3), normals.reshape(-1, 3)
-        facing = np.cross(flat[faces[:, 1]] - flat[faces[:, 0]], flat[faces[:, 2]] - flat[faces[:, 0]])
-        away = (facing * up[faces].sum(axis=1)).sum(axis=1) < 0
-        faces[away] = faces[away][:, ::-1]
-        self._faces.append(faces[np.linalg.norm(facing, axis=1) > 1e-12] + self._count)
-        self._vertices.append(np.hstack([flat, up, uvs.reshape(-1, 2)]))
-        self._count += m * n
-
-    def file(self) -> bytes:
-        names = ("x", "y", "z", "nx", "ny", "nz", "s", "t")
-        columns = np.concatenate(self._vertices).round(6).T + 0.0  # no -0
-        return ply.encode(dict(zip(names, columns, strict=True)), np.concatenate(self._faces))
 
 
 def _band(half_length: float, half_width: float, radius: float, along: int) -> Curve:
@@ -94,7 +64,7 @@ def _bent(curve: Curve, middle: float, radius: float) -> Curve:
     return points, n_along[:, None] * down + n_out[:, None] * away
 
 
-def _shell(mesh: _Mesh, top: float, bottom: float, cut: tuple[float, float] | None) -> None:
+def _shell(mesh: Mesh, top: float, bottom: float, cut: tuple[float, float] | None) -> None:
     """From the polar angle `top` to `bottom`, degrees."""
     radius, middle = (OUTER + INNER) / 2, math.radians(top + bottom) / 2
     length, width = radius * math.radians(bottom - top) / 2, (OUTER - INNER) / 2
@@ -127,7 +97,7 @@ def _turned(points: np.ndarray, angle: float) -> np.ndarray:
     return np.stack([r * math.sin(angle), y, r * math.cos(angle)], axis=-1)
 
 
-def _lathe(mesh: _Mesh, points: np.ndarray, normals: np.ndarray, begin: float, end: float) -> None:
+def _lathe(mesh: Mesh, points: np.ndarray, normals: np.ndarray, begin: float, end: float) -> None:
     """Turn a closed curve of (distance from the axis, height) about the axis, from one angle to the other."""
     points, normals = np.concatenate([points, points[:1]]), np.concatenate([normals, normals[:1]])
     angles = np.linspace(begin, end, round(AROUND * (end - begin) / (2 * math.pi)) + 1)
@@ -150,7 +120,7 @@ def _dish() -> Curve:
     return sheet, normals[:, :1] * along + normals[:, 1:] * up
 
 
-def _slab(mesh: _Mesh) -> None:
+def _slab(mesh: Mesh) -> None:
     """A square with rounded corners and edges, from the middle of its lower face up to that of its upper one."""
     half, corner, low, high, edge = 0.88, 0.2, 0.002, 0.15, 0.018
     quarter = np.linspace(0, math.pi / 2, 9)

@@ -32,6 +32,19 @@ def softbox() -> bytes:
     return exr.encode(picture)
 
 
+def night_studio() -> bytes:
+    """Almost dark: a soft glow on the backdrop behind the subject, and what a ceiling sends back."""
+    d = directions()
+    dark = 0.012 + 0.02 * smoothstep(-0.2, 1.0, d[:, :, 1])
+    picture = dark[:, :, None] * np.array([0.85, 0.93, 1.1])
+    across = np.degrees(np.arctan2(d[:, :, 0], -d[:, :, 2]))
+    height = np.degrees(np.arcsin(d[:, :, 1]))
+    glow = np.exp(-((across / 30) ** 2) - (height / 15) ** 2)
+    wide = np.exp(-((across / 75) ** 2) - (height / 32) ** 2)
+    picture += glow[:, :, None] * np.array([0.4, 0.26, 0.16]) + wide[:, :, None] * np.array([0.045, 0.048, 0.06])
+    return exr.encode(picture)
+
+
 def _hang(
     picture: np.ndarray,
     d: np.ndarray,
