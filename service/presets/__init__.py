@@ -1,12 +1,14 @@
 """Built-in scenes, materials, environments and stages: JSON documents, and assets that our own code makes for them.
 
-A file's `title` is for menus, its `kind` (of a material) for their parts, its `source` says where numbers were
-measured; none of them is part of the document. A material that shows textures is stored with them, as users save one.
-A stage is what things stand on: materials and shapes that it adds to a scene whose thing stands on the origin.
-`"builtin:NAME"` in it stands for an asset of `generated`.
+A file's `title` is for menus, its `kind` (of a material) and `group` (of a scene) for their parts, its `source` says
+where numbers were measured; none of them is part of the document. A material that shows textures is stored with them,
+as users save one. A stage is what things stand on: materials and shapes that it adds to a scene whose thing stands on
+the origin. `"builtin:NAME"` in it stands for an asset of `generated`.
 
 physically_based  materials of the Physically Based database
 generated      the assets that presets use
+mesh           grids, turned curves and rounded boxes, of which the things in scenes are made
+glassware, candle, bottle, watch, orange, car_panel, armchair, cloth, tree  the things in scenes
 field          a thousand spheres
 disney_charts  spheres that show what each parameter of `disney` does
 knot           a torus knot, as a mesh
@@ -23,7 +25,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from typing import Any
 
@@ -39,6 +41,13 @@ SUBJECT = "subject"  # the material that is looked at there
 # A material for each kernel that many of the library need, the most useful first.
 FAVOURITES = ("gold", "skin", "glass", "ceramic", "car-paint", "matte-clay", "jade", "brushed-aluminium")
 
+# Menus begin with these scenes; others follow by title, and those of the group "Tests" come last.
+FIRST_SCENES = (
+    DEFAULT_SCENE, "pool", "whisky", "candle", "water-glass", "perfume", "watch", "orange", "car-panel", "armchair",
+    "prism", "fog", "cornell-boxes",
+)  # fmt: skip
+HEADING = ("title", "kind", "group", "source")  # what a file has for lists, beside its document
+
 # Documents that would be long files of numbers.
 COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
     ("scenes", "sphere-field"): sphere_field,
@@ -48,16 +57,24 @@ COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
 
 
 def names(kind: str) -> list[dict[str, str]]:
-    """`[{name, title}]`, of materials with their `kind` and, where numbers were measured, their `source`.
+    """`[{name, title}]`, of materials with their `kind` and, where numbers were measured, their `source`; of some
+    scenes with their `group`.
 
-    In the order of the titles; the database's materials come last. Raises NotFound.
+    By title, after the first scenes; tests and the database's materials come last. Raises NotFound.
     """
     titled = [{"name": name} | _heading(_titled(kind, name)) for name in _known(kind)]
-    return sorted(titled, key=lambda entry: (entry.get("kind") == physically_based.KIND, entry["title"]))
+    return sorted(titled, key=partial(_place, kind))
+
+
+def _place(kind: str, entry: dict[str, str]) -> tuple[bool, int, str]:
+    first = (
+        FIRST_SCENES.index(entry["name"]) if kind == "scenes" and entry["name"] in FIRST_SCENES else len(FIRST_SCENES)
+    )
+    return "group" in entry or entry.get("kind") == physically_based.KIND, first, entry["title"]
 
 
 def _heading(stored: dict[str, Any]) -> dict[str, str]:
-    return {key: stored[key] for key in ("title", "kind", "source") if key in stored}
+    return {key: stored[key] for key in HEADING if key in stored}
 
 
 def get(kind: str, name: str) -> dict[str, Any]:
@@ -70,11 +87,11 @@ def get(kind: str, name: str) -> dict[str, Any]:
 
 def likely() -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]:
     """What a client is likely to look at: the scene with which the editor begins, that scene of other materials, and
-    the other scenes."""
+    the other scenes but tests."""
     shown = get("scenes", DEFAULT_SCENE)
     edits = [_dressed(shown, get("materials", name)) for name in FAVOURITES]
-    others = [get("scenes", each["name"]) for each in names("scenes") if each["name"] != DEFAULT_SCENE]
-    return shown, edits, others
+    others = [each["name"] for each in names("scenes") if each["name"] != DEFAULT_SCENE and "group" not in each]
+    return shown, edits, [get("scenes", name) for name in others]
 
 
 def _dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
@@ -116,5 +133,5 @@ def _titled(kind: str, name: str) -> dict[str, Any]:
 
 @cache
 def _text(kind: str, name: str) -> str:
-    document = {key: value for key, value in _titled(kind, name).items() if key not in ("title", "kind", "source")}
+    document = {key: value for key, value in _titled(kind, name).items() if key not in HEADING}
     return re.sub(r'"builtin:([a-z-]+)"', lambda match: f'"{asset_id(match[1])}"', json.dumps(document))

@@ -21,7 +21,11 @@ def cushion() -> bytes:
     def filled(p: np.ndarray, n: np.ndarray) -> np.ndarray:
         x, _, z = (p[..., k] / SEAT[k] for k in range(3))
         puff = 0.03 * (1 - x**2) * (1 - z**2) - 0.012 * np.exp(-(x**2 + (z - 0.1) ** 2) / 0.2)
-        return np.asarray(p + np.array([0, 1.0, 0]) * (puff * np.sign(n[..., 1]))[..., None] + n * (0.0025 * waves(p, 3, 0.14))[..., None])
+        return np.asarray(
+            p
+            + np.array([0, 1.0, 0]) * (puff * np.sign(n[..., 1]))[..., None]
+            + n * (0.0025 * waves(p, 3, 0.14))[..., None]
+        )
 
     rounded_box(mesh, SEAT, 0.055, steps=8, flats=(28, 4, 28), moved=filled)
     return mesh.file()
@@ -45,7 +49,11 @@ def back() -> bytes:
 def buttons() -> bytes:
     """Where the creases of the back cross."""
     mesh, one = Mesh(), Mesh()
-    lathe(one, filleted([(0, -0.004, 0), (0.017, -0.004, 0.003), (0.017, 0.004, 0.006), (0, 0.008, 0)], steps=4), around=24)
+    lathe(
+        one,
+        filleted([(0, -0.004, 0), (0.017, -0.004, 0.003), (0.017, 0.004, 0.006), (0, 0.008, 0)], steps=4),
+        around=24,
+    )
     turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from +Y to +Z
     for row in range(-2, 3):
         for column in range(-3, 4):
@@ -61,7 +69,10 @@ def arm() -> bytes:
 
     def rolled(p: np.ndarray, n: np.ndarray) -> np.ndarray:
         high = np.clip((p[..., 1] - 0.08) / 0.19, 0, 1)
-        out = np.stack([-0.045 * high**2 + p[..., 0] * 0.25 * high, 0.012 * high * (1 - (p[..., 0] / ARM[0]) ** 2), 0 * high], axis=-1)
+        out = np.stack(
+            [-0.045 * high**2 + p[..., 0] * 0.25 * high, 0.012 * high * (1 - (p[..., 0] / ARM[0]) ** 2), 0 * high],
+            axis=-1,
+        )
         return np.asarray(p + out + n * (0.002 * waves(p, 7, 0.16))[..., None])
 
     rounded_box(mesh, ARM, 0.075, steps=10, flats=(8, 20, 20), moved=rolled)
@@ -77,8 +88,10 @@ def pillow() -> bytes:
         x, y = p[..., 0] / half, p[..., 1] / half
         full = np.sqrt(np.clip((1 - np.abs(x) ** 2.4) * (1 - np.abs(y) ** 2.4), 0, 1))
         pull = 1 - 0.09 * (1 - np.abs(x) ** 2) * (np.abs(y) ** 3) - 0.09 * (1 - np.abs(y) ** 2) * (np.abs(x) ** 3)
-        creases = 1 + 0.05 * waves(np.stack([x, y, 0 * x], -1) * 0.2, 12, 0.06)
-        return np.asarray(np.stack([p[..., 0] * pull, p[..., 1] * pull, p[..., 2] * (0.1 + 0.9 * full * creases)], axis=-1))
+        creases = 1 + 0.02 * waves(np.stack([x, y, 0 * x], -1) * 0.2, 12, 0.1)
+        return np.asarray(
+            np.stack([p[..., 0] * pull, p[..., 1] * pull, p[..., 2] * (0.1 + 0.9 * full * creases)], axis=-1)
+        )
 
     rounded_box(mesh, (half, half, 0.085), 0.03, steps=6, flats=(30, 30, 4), moved=stuffed)
     return mesh.file()

@@ -12,7 +12,9 @@ def bottle() -> bytes:
     """The block about 0 with its hollow, which is round at its edges."""
     mesh = Mesh()
     rounded_box(mesh, HALF, 0.05, steps=6, flats=(2, 2, 2))
-    rounded_box(mesh, (HALF[0] - WALL, HALF[1] - 1.35 * WALL, HALF[2] - WALL), 0.06, steps=8, flats=(2, 2, 2), hollow=True)
+    rounded_box(
+        mesh, (HALF[0] - WALL, HALF[1] - 1.35 * WALL, HALF[2] - WALL), 0.06, steps=8, flats=(2, 2, 2), hollow=True
+    )
     return mesh.file()
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from service.presets.mesh import Mesh, filleted, lathe, smooth
+from service.presets.mesh import Mesh, denser, filleted, lathe, on_the_right, smooth
 
 RADIUS, TALL = 0.24, 0.8  # metres
 WICK = 0.62  # height of the melted wax about the wick
@@ -22,22 +22,10 @@ def wax() -> bytes:
         (RADIUS, TALL, 0.03), (RADIUS - 0.055, TALL, 0.022), (RADIUS - 0.075, TALL - 0.05, 0.05),
         (0.0, TALL - 0.055, 0),
     ], steps=5)  # fmt: skip
-    points, _ = line
-    dense = _denser(points, 0.025)
-    lathe(mesh, dense, around=144, shape=_ran)
+    # Drips bend what would be straight.
+    points = denser(line[0], 0.025)
+    lathe(mesh, (points, on_the_right(points)), around=144, shape=_ran)
     return mesh.file()
-
-
-def _denser(points: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """The line with further points on its long pieces: drips bend what would be straight."""
-    rows = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
-        n = max(1, math.ceil(float(np.linalg.norm(b - a)) / step))
-        rows.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
-    line = np.concatenate(rows)
-    way = np.gradient(line, axis=0)
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-    return line, np.stack([way[:, 1], -way[:, 0]], axis=1)
 
 
 def _ran(angles: np.ndarray, heights: np.ndarray) -> np.ndarray:
@@ -55,7 +43,9 @@ def _ran(angles: np.ndarray, heights: np.ndarray) -> np.ndarray:
 
 def flame() -> bytes:
     """The outer flame from y = 0 up, pointed above."""
-    return _turned([(0.0, 0.0), (0.032, 0.012), (0.056, 0.06), (0.06, 0.11), (0.044, 0.19), (0.018, 0.26), (0.0, FLAME)])
+    return _turned(
+        [(0.0, 0.0), (0.032, 0.012), (0.056, 0.06), (0.06, 0.11), (0.044, 0.19), (0.018, 0.26), (0.0, FLAME)]
+    )
 
 
 def flame_foot() -> bytes:

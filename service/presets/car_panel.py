@@ -27,9 +27,10 @@ def _flank(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     crease = 0.74 + 0.035 * x - 0.004 * x**2
     over, under = np.maximum(y - crease, 0), np.maximum(crease - y, 0)
     # Hollow below the crease, round above it; the crease itself is bent over half a centimetre.
-    z = 0.18 - 0.62 * over**2 - 0.9 * over**4 - 0.34 * (1 - np.exp(-under / 0.1)) * 0.22
+    z = 0.18 - 0.62 * over**2 - 0.9 * over**4 - 0.34 * (1 - np.exp(-under / 0.1)) * 0.3
     z += 0.1 * np.exp(-(((y - 0.32) / 0.26) ** 2)) - 0.35 * np.maximum(0.12 - y, 0)
     z += 0.02 * np.cos(x * 0.6) - 0.012 * x**2
+    z += 0.1 * np.exp(-(((x - 1.5) / 0.75) ** 2) - ((y - 0.5) / 0.34) ** 2)  # over the wheel
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
 
 

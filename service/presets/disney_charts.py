@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from service.presets.lettering import written
+
 STEPS = 11  # spheres of a row: the parameter is 0, .1, ... 1
 # What each row's material has besides its own parameter: without specular light a specular tint shows nothing.
 ROWS: dict[str, dict[str, Any]] = {
@@ -33,6 +35,8 @@ GRID = (0.0, 0.25, 0.5, 0.75, 1.0)
 GRID_SPECULAR = (0.0, 0.25, 0.5, 1.0)
 
 RADIUS, PITCH = 0.45, 1.0  # metres
+LETTERS = 0.05  # metres of a square of the labels' letters
+INK = {"type": "diffuse", "albedo": 0.01}
 
 
 def parameter_rows() -> dict[str, Any]:
@@ -44,7 +48,16 @@ def parameter_rows() -> dict[str, Any]:
             name = "subject" if (parameter, step) == SUBJECT else f"{parameter}-{value:g}"
             materials[name] = {"type": "disney", **others, parameter: value}
             shapes.append(_ball(step - (STEPS - 1) / 2, (len(ROWS) - 1) / 2 - row, name))
-    return _chart("Disney parameters, 0 to 1", materials, shapes, distance=24.5) | {"lights": LAMPS}
+    chart = _chart("Disney parameters, 0 to 1", "disney-parameters-labels", materials, shapes, distance=26.5)
+    chart["camera"] |= {"position": [-1.6, 0.2, 26.5], "target": [-1.6, 0.2, 0]}  # labels stand on the left
+    return chart | {"lights": LAMPS}
+
+
+def parameter_labels() -> bytes:
+    """Of each row on its left, and 0, 0.5 and 1 above their columns."""
+    end, top = (STEPS - 1) / 2, (len(ROWS) - 1) / 2
+    rows = [(name.replace("_", " "), -end - 0.75, top - row, 1.0) for row, name in enumerate(ROWS)]
+    return written([*rows, *((f"{x + 0.5:g}", x * 2 * end, top + 0.85, 0.5) for x in (-0.5, 0.0, 0.5))], LETTERS)
 
 
 def parameter_grid() -> dict[str, Any]:
@@ -65,7 +78,26 @@ def parameter_grid() -> dict[str, Any]:
                 }
                 x, y = (block % 2 - 0.5) * apart, (0.5 - block // 2) * apart
                 shapes.append(_ball(x + column - middle, y + row - middle, name))
-    return _chart("Disney grid: metallic, roughness, specular", materials, shapes, distance=23.5)
+    title = "Disney grid: metallic, roughness, specular"
+    chart = _chart(title, "disney-grid-labels", materials, shapes, distance=26.5)
+    chart["camera"] |= {"position": [-0.3, 0.1, 26.5], "target": [-0.3, 0.1, 0]}
+    return chart
+
+
+def grid_labels() -> bytes:
+    """Of each block its specular above it; of the roughness below, of the metallic on the left."""
+    apart, reach = len(GRID) + 0.6, (len(GRID) - 1) / 2
+    lines = []
+    for block, specular in enumerate(GRID_SPECULAR):
+        x, y = (block % 2 - 0.5) * apart, (0.5 - block // 2) * apart
+        lines.append((f"specular {specular:g}", x, y + reach + 0.72, 0.5))
+        if block // 2:
+            lines += [(f"{value:g}", x + k - reach, y - reach - 0.7, 0.5) for k, value in enumerate(GRID)]
+            lines.append(("roughness", x, y - reach - 1.1, 0.5))
+        if not block % 2:
+            lines += [(f"{value:g}", x - reach - 0.65, y + k - reach, 1.0) for k, value in enumerate(GRID)]
+            lines.append(("metallic", x - reach - 0.55, y + reach + 0.72, 1.0))
+    return written(lines, 0.8 * LETTERS)
 
 
 def _ball(x: float, y: float, material: str) -> dict[str, Any]:
@@ -73,14 +105,17 @@ def _ball(x: float, y: float, material: str) -> dict[str, Any]:
     return {"type": "sphere", "center": center, "radius": RADIUS, "material": material}
 
 
-def _chart(title: str, materials: dict[str, Any], shapes: list[dict[str, Any]], distance: float) -> dict[str, Any]:
+def _chart(
+    title: str, labels: str, materials: dict[str, Any], shapes: list[dict[str, Any]], distance: float
+) -> dict[str, Any]:
     """Nothing stands between the spheres and the studio's lamps but other spheres."""
     return {
         "title": title,
+        "group": "Tests",
         "version": 1,
         # A long lens: all spheres are seen and lit nearly alike.
         "camera": {"position": [0, 0, distance], "target": [0, 0, 0], "vfov": 28},
         "environment": {"type": "image", "asset": "builtin:studio", "rotation": -20},
-        "materials": materials,
-        "shapes": shapes,
+        "materials": materials | {"Ink": INK},
+        "shapes": [*shapes, {"name": "Labels", "type": "mesh", "asset": f"builtin:{labels}", "material": "Ink"}],
     }

@@ -24,11 +24,11 @@ def sphere_field() -> dict[str, Any]:
     return {
         "title": "Field of 1000 spheres",
         "version": 1,
-        "camera": {"position": [0, 4.4, 12.5], "target": [0, 0.5, 0.6], "vfov": 34},
+        "camera": {"position": [0, 4.6, 11.6], "target": [0, 0.05, 0.6], "vfov": 30},
         "environment": {"type": "image", "asset": "builtin:studio", "rotation": -20},
         "materials": {
             "subject": {"type": "disney", "base_color": [0.955, 0.638, 0.538], "metallic": 1, "roughness": 0.12},
-            "floor": {"type": "diffuse", "albedo": 0.3},
+            "floor": {"type": "diffuse", "albedo": 0.11},
             **{_name(i): _material(i) for i in range(len(COLORS) * len(FINISHES))},
         },
         "shapes": [

@@ -6,7 +6,23 @@ import hashlib
 from collections.abc import Callable
 from functools import cache
 
-from service.presets import armchair, bottle, candle, car_panel, cloth, cyclorama, glassware, knot, orange, shader_ball, skies, studio, tree, watch
+from service.presets import (
+    armchair,
+    bottle,
+    candle,
+    car_panel,
+    cloth,
+    cyclorama,
+    disney_charts,
+    glassware,
+    knot,
+    orange,
+    shader_ball,
+    skies,
+    studio,
+    tree,
+    watch,
+)
 
 ASSETS: dict[str, Callable[[], bytes]] = {
     "studio": studio.studio,
@@ -46,6 +62,8 @@ ASSETS: dict[str, Callable[[], bytes]] = {
     "chair-pillow": armchair.pillow,
     "chair-leg": armchair.leg,
     "bare-tree": tree.bare_tree,
+    "disney-parameters-labels": disney_charts.parameter_labels,
+    "disney-grid-labels": disney_charts.grid_labels,
     "watch-case": watch.case,
     "watch-markers": watch.markers,
     "watch-hands": watch.hands,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,9 +21,7 @@ class Mesh:
         self._faces: list[np.ndarray] = []
         self._count = 0
 
-    def add(
-        self, points: np.ndarray, normals: np.ndarray, uvs: np.ndarray, colors: np.ndarray | None = None
-    ) -> None:
+    def add(self, points: np.ndarray, normals: np.ndarray, uvs: np.ndarray, colors: np.ndarray | None = None) -> None:
         """A grid (m, n, 3) with texture coordinates (m, n, 2), and colours (m, n, 3) if all grids have them."""
         m, n = points.shape[:2]
         corner = np.arange(m * n).reshape(m, n)
@@ -37,7 +36,7 @@ class Mesh:
         self._vertices.append(np.hstack(columns))
         self._count += m * n
 
-    def copy(self, other: Mesh, turn: np.ndarray, move: Sequence[float]) -> None:
+    def copy(self, other: Mesh, turn: np.ndarray, move: Sequence[float] | np.ndarray) -> None:
         """All of another mesh, turned by a rotation (3, 3) and moved."""
         vertices = np.concatenate(other._vertices)
         turned = [vertices[:, :3] @ turn.T + move, vertices[:, 3:6] @ turn.T, vertices[:, 6:]]
@@ -52,7 +51,7 @@ class Mesh:
 
 
 def filleted(corners: Sequence[tuple[float, float, float]], steps: int = 4) -> Curve:
-    """A line through corners (x, y, radius of the corner), each rounded by an arc. Outward is on the right of the way.
+    """A line through corners (x, y, radius), each rounded by an arc; outward is on the right of the way.
 
     The ends' radii do not count.
     """
@@ -139,7 +138,8 @@ def rounded_box(
 ) -> None:
     """A box about 0 with rounded edges: `steps` across each of them, `flats` along each axis.
 
-    `hollow`: it is a hole in what is around it. `moved(points, normals)` gives other points; normals follow from the surface then.
+    `hollow`: it is a hole in what is around it. `moved(points, normals)` gives other points; normals follow from the
+    surface then.
     """
     inner = np.array(half) - radius
     turn = np.tan(np.linspace(-math.pi / 4, 0, steps // 2 + 1))
@@ -180,9 +180,25 @@ def _moved(
     return at, facing / np.linalg.norm(facing, axis=-1, keepdims=True)
 
 
+def denser(points: np.ndarray, step: float) -> np.ndarray:
+    """A line with further points, none more than `step` from the next."""
+    rows = [points[:1]]
+    for a, b in pairwise(points):
+        n = math.ceil(float(np.linalg.norm(b - a)) / step)  # none where both are one point
+        if not n:
+            continue
+        rows.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
+    return np.concatenate(rows)
+
+
+def on_the_right(points: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 2) of a line, to the right of its way."""
+    way = np.gradient(points, axis=0)
+    return _right(way / np.linalg.norm(way, axis=1, keepdims=True))
+
+
 def waves(points: np.ndarray, seed: int, finest: float, count: int = 24) -> np.ndarray:
-    """A smooth random field of standard deviation 1 over points (..., 3): sines of random directions, `finest` metres
-    the shortest of their waves."""
+    """Smooth random numbers of standard deviation 1 over points (..., 3): sines, the shortest `finest` m long."""
     draw = np.random.default_rng(seed)
     ways = draw.normal(size=(count, 3))
     ways *= (2 * math.pi / (finest * draw.uniform(1, 3, count)) / np.linalg.norm(ways, axis=1))[:, None]

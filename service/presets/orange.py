@@ -14,7 +14,7 @@ SEGMENTS = 10
 PITH, FLESH, CORE = 0.965, 0.885, 0.09  # where the pith, the flesh and the core end, in radii
 PEEL_COLOR = np.array([0.92, 0.3, 0.012])
 PITH_COLOR = np.array([0.93, 0.83, 0.6])
-FLESH_COLOR, PALE_FLESH = np.array([0.93, 0.36, 0.012]), np.array([0.98, 0.58, 0.1])
+FLESH_COLOR, PALE_FLESH = np.array([0.93, 0.27, 0.008]), np.array([0.97, 0.45, 0.05])
 LEAF_LONG, LEAF_WIDE = 0.95, 0.2  # length, and half its greatest width
 
 
@@ -51,7 +51,9 @@ def _peel(mesh: Mesh, begin: float, end: float) -> None:
     """From one polar angle to another: dimpled but for the edge of a cut."""
     polar = np.linspace(begin, end, round(80 * (end - begin) / math.pi) + 1)[:, None]
     angles = np.linspace(0, 2 * math.pi, 129)
-    out = np.stack(np.broadcast_arrays(np.sin(polar) * np.sin(angles), np.cos(polar), np.sin(polar) * np.cos(angles)), -1)
+    out = np.stack(
+        np.broadcast_arrays(np.sin(polar) * np.sin(angles), np.cos(polar), np.sin(polar) * np.cos(angles)), -1
+    )
     out[:, -1] = out[:, 0]
     bumps = waves(out * RADIUS, 8, 0.034, 48)
     keep = np.clip((polar - begin) / 0.06, 0, 1) if begin else np.ones_like(polar)
@@ -73,8 +75,14 @@ def _face(mesh: Mesh, height: float, side: float, seed: int) -> None:
     walls = (np.arange(SEGMENTS) + 0.16 * draw.normal(size=SEGMENTS)) * 2 * math.pi / SEGMENTS
     apart = np.abs((angles[:, None] - walls + math.pi) % (2 * math.pi) - math.pi).min(axis=1)
     skin = apart * share * RADIUS  # the distance to the nearest skin
-    inside = np.clip((FLESH - share) / 0.03, 0, 1) * np.clip((share - CORE) / 0.04, 0, 1) * np.clip((skin - 0.003) / 0.009, 0, 1)
-    place = np.stack(np.broadcast_arrays(share * np.sin(angles), 0.0 * share, share * np.cos(angles)), axis=-1) * RADIUS
+    inside = (
+        np.clip((FLESH - share) / 0.03, 0, 1)
+        * np.clip((share - CORE) / 0.04, 0, 1)
+        * np.clip((skin - 0.003) / 0.009, 0, 1)
+    )
+    place = (
+        np.stack(np.broadcast_arrays(share * np.sin(angles), 0.0 * share, share * np.cos(angles)), axis=-1) * RADIUS
+    )
     place[:, -1] = place[:, 0]
     inside[:, -1] = inside[:, 0]
     # Vesicles point to the middle: long along the radius, narrow across it.
@@ -85,7 +93,10 @@ def _face(mesh: Mesh, height: float, side: float, seed: int) -> None:
     colors = PITH_COLOR + (flesh - PITH_COLOR) * inside[..., None]
     rim = np.clip((share - PITH) / (1 - PITH), 0, 1)[..., None]
     colors = colors + (PEEL_COLOR - colors) * np.broadcast_to(rim, colors.shape)
-    grid = place + np.array([0, 1.0, 0]) * (height + side * inside * (0.006 + 0.0016 * grain) * (share < FLESH))[..., None]
+    grid = (
+        place
+        + np.array([0, 1.0, 0]) * (height + side * inside * (0.006 + 0.0016 * grain) * (share < FLESH))[..., None]
+    )
     up = np.broadcast_to([0.0, side, 0], grid.shape)
     normals = bent_normals(grid.swapaxes(0, 1), up.swapaxes(0, 1), closed=True).swapaxes(0, 1)
     mesh.add(grid, normals, place[..., [0, 2]], np.clip(colors, 0, 1))
@@ -104,7 +115,7 @@ def leaf() -> bytes:
     # Side veins leave the midrib at a slant.
     slant = (t * 9 - np.abs(s) * 1.1) % 1
     veins = np.exp(-(((slant - 0.5) / 0.09) ** 2)) * 0.55 + np.exp(-((z / 0.008) ** 2))
-    green = np.array([0.09, 0.25, 0.035]) * (1 + 0.12 * waves(grid, 6, 0.08))[..., None]
-    colors = np.clip(green + np.array([0.2, 0.26, 0.08]) * np.clip(veins, 0, 1)[..., None], 0, 1)
+    green = np.array([0.05, 0.19, 0.025]) * (1 + 0.12 * waves(grid, 6, 0.08))[..., None]
+    colors = np.clip(green + np.array([0.12, 0.2, 0.05]) * np.clip(veins, 0, 1)[..., None], 0, 1)
     mesh.add(grid, bent_normals(grid, np.broadcast_to([0.0, 1, 0], grid.shape)), grid[..., [0, 2]], colors)
     return mesh.file()

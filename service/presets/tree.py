@@ -20,7 +20,13 @@ def bare_tree() -> bytes:
 
 
 def _grow(
-    mesh: Mesh, draw: np.random.Generator, start: np.ndarray, way: np.ndarray, length: float, radius: float, level: int
+    mesh: Mesh,
+    draw: np.random.Generator,
+    start: np.ndarray,
+    way: np.ndarray,
+    length: float,
+    radius: float,
+    level: int,
 ) -> None:
     way = way / np.linalg.norm(way)
     bend = np.cross(way, draw.normal(size=3))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from service.presets.mesh import Curve, Mesh, bent_normals, filleted, lathe, rounded_box
+from service.presets.mesh import Curve, Mesh, bent_normals, denser, filleted, lathe, on_the_right, rounded_box
 
 CASE, DIAL = 1.0, 0.8  # radii: of the case, of the dial
 HEIGHT = 0.42  # of the case; the dial lies at 0.26
@@ -17,9 +17,9 @@ def case() -> bytes:
     """The ring of the case, its bezel and what is under the dial, on y = 0."""
     mesh = Mesh()
     lathe(mesh, filleted([
-        (0, 0.0, 0), (0.82, 0.0, 0.05), (0.97, 0.1, 0.05), (CASE, 0.14, 0.03), (CASE, 0.28, 0.02), (0.985, 0.31, 0.01),
-        (0.975, 0.315, 0.006), (0.95, 0.37, 0.03), (0.87, HEIGHT, 0.02), (0.835, HEIGHT, 0.015), (DIAL, 0.36, 0.012),
-        (DIAL, 0.24, 0.008), (0, 0.24, 0),
+        (0, 0.0, 0), (0.82, 0.0, 0.05), (0.97, 0.1, 0.05), (CASE, 0.14, 0.03), (CASE, 0.28, 0.02),
+        (0.985, 0.31, 0.01), (0.975, 0.315, 0.006), (0.95, 0.37, 0.03), (0.87, HEIGHT, 0.02),
+        (0.835, HEIGHT, 0.015), (DIAL, 0.36, 0.012), (DIAL, 0.24, 0.008), (0, 0.24, 0),
     ], steps=4), around=144)  # fmt: skip
     for x in (-1, 1):
         for z in (-1, 1):
@@ -29,11 +29,12 @@ def case() -> bytes:
 
 def _lug(mesh: Mesh, x: float, side: float) -> None:
     """An arm that holds the strap, bent down to its end."""
+
     def bent(p: np.ndarray, _: np.ndarray) -> np.ndarray:
         down = np.clip((p[..., 2] + 0.3) / 0.6, 0, 1)
         moved = p * np.stack([np.ones_like(down), 1 - 0.45 * down, np.ones_like(down)], axis=-1)
         moved[..., 1] -= 0.14 * down**2
-        return np.asarray((moved + [x, 0.2, 1.02]) * [1, 1, side])
+        return np.asarray((moved + np.array([x, 0.2, 1.02])) * [1, 1, side])
 
     rounded_box(mesh, (0.075, 0.12, 0.32), 0.035, steps=4, flats=(2, 2, 6), moved=bent)
 
@@ -61,7 +62,9 @@ def hands() -> bytes:
     _hand(mesh, math.radians(305), -0.12, 0.46, 0.03, 0.275)
     _hand(mesh, math.radians(60), -0.14, 0.68, 0.024, 0.292)
     _hand(mesh, math.radians(204), -0.2, 0.72, 0.006, 0.308)
-    lathe(mesh, filleted([(0, 0.245, 0), (0.045, 0.245, 0.002), (0.045, 0.32, 0.01), (0, 0.325, 0)], steps=3), around=32)
+    lathe(
+        mesh, filleted([(0, 0.245, 0), (0.045, 0.245, 0.002), (0.045, 0.32, 0.01), (0, 0.325, 0)], steps=3), around=32
+    )
     return mesh.file()
 
 
@@ -84,7 +87,16 @@ def crown() -> bytes:
     mesh = Mesh()
     lathe(
         mesh,
-        filleted([(0, -0.1, 0), (0.05, -0.1, 0.004), (0.06, 0.0, 0.004), (0.13, 0.01, 0.015), (0.13, 0.15, 0.02), (0, 0.165, 0)]),
+        filleted(
+            [
+                (0, -0.1, 0),
+                (0.05, -0.1, 0.004),
+                (0.06, 0.0, 0.004),
+                (0.13, 0.01, 0.015),
+                (0.13, 0.15, 0.02),
+                (0, 0.165, 0),
+            ]
+        ),
         around=120,
         shape=lambda angles, heights: 1 + 0.035 * np.cos(30 * angles) * (heights > 0.02) * (heights < 0.14),
     )
@@ -101,15 +113,9 @@ def strap() -> bytes:
 
 def _spine() -> Curve:
     """(distance from the middle of the watch, height) along the strap, and the normals above."""
-    line, out = filleted([(0.98, 0.2, 0), (1.32, 0.14, 0.3), (1.9, 0.075, 1.2), (5.4, 0.075, 0)], steps=10)
-    dense = [line[:1]]
-    for a, b in zip(line[:-1], line[1:], strict=True):
-        n = max(1, math.ceil(float(np.linalg.norm(b - a)) / 0.08))
-        dense.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
-    points = np.concatenate(dense)
-    way = np.gradient(points, axis=0)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    return points, np.stack([-way[:, 1], way[:, 0]], axis=1)
+    line, _ = filleted([(0.98, 0.2, 0), (1.32, 0.14, 0.3), (1.9, 0.075, 1.2), (5.4, 0.075, 0)], steps=10)
+    points = denser(line, 0.08)
+    return points, -on_the_right(points)
 
 
 def _half_strap(mesh: Mesh, side: float) -> None:
@@ -120,12 +126,21 @@ def _half_strap(mesh: Mesh, side: float) -> None:
     # A superellipse: flat below, padded above.
     x = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** 0.35
     y = np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** 0.7
-    fat = np.where(y > 0, half * (0.75 + 0.9 * np.exp(-((path / 1.3) ** 2)))[:, None] * (1 - 0.3 * np.abs(x) ** 6), half)
+    fat = np.where(
+        y > 0, half * (0.75 + 0.9 * np.exp(-((path / 1.3) ** 2)))[:, None] * (1 - 0.3 * np.abs(x) ** 6), half
+    )
     across, up = width[:, None] * x, fat * y
     grid = np.stack(
-        [across, points[:, None, 1] + up * normals[:, None, 1], side * (points[:, None, 0] + up * normals[:, None, 0])], axis=-1
+        [
+            across,
+            points[:, None, 1] + up * normals[:, None, 1],
+            side * (points[:, None, 0] + up * normals[:, None, 0]),
+        ],
+        axis=-1,
     )
-    rough = np.stack(np.broadcast_arrays(x, y * normals[:, None, 1] + 0 * up, side * y * normals[:, None, 0]), axis=-1)
+    rough = np.stack(
+        np.broadcast_arrays(x, y * normals[:, None, 1] + 0 * up, side * y * normals[:, None, 0]), axis=-1
+    )
     bent = bent_normals(grid, rough)
     uvs = np.stack(np.broadcast_arrays(path[:, None], across + half * y), axis=-1)
     mesh.add(grid, bent, uvs)

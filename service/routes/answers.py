@@ -71,6 +71,7 @@ class NamedPreset(Named):
         "Physically Based database.",
     )
     source: str | None = Field(None, description="Who measured a material's numbers, where they were measured.")
+    group: str | None = Field(None, description="Of a scene: the part of a menu that it stands in, if not the first.")
 
 
 class RendererPlace(BaseModel):

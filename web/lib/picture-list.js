@@ -61,8 +61,8 @@ export class PictureList {
     }
   }
 
-  // `entries`: [{value, title, label, hint}]: `title` names the option, `label` is what is written under its picture
-  // (the title, unless given). `paint(image, value)` is called for each new picture.
+  // `entries`: [{value, title, label, hint, group}]: `title` names the option, `label` is what is written under its
+  // picture (the title, unless given); those of a `group` stand together under its name. `paint(image, value)` is called for each new picture.
   fill(entries, paint) {
     const values = entries.map(({ value }) => value);
     const isSame = values.length === this.#shown.length && values.every((each, i) => each === this.#shown[i]);
@@ -91,7 +91,16 @@ export class PictureList {
     for (const value of this.#options.keys())
       if (!values.includes(value) && this.follows) this.#options.delete(value);
     this.#shown = values;
-    this.root.replaceChildren(...values.map((value) => this.#options.get(value).node));
+    const groups = new Map();
+    for (const { value, group = "" } of entries) {
+      if (!groups.has(group)) groups.set(group, []);
+      groups.get(group).push(this.#options.get(value).node);
+    }
+    this.root.replaceChildren(
+      ...[...groups].flatMap(([group, nodes]) =>
+        group ? element("div", { role: "group", class: "pictures", "aria-label": group }, ...nodes) : nodes,
+      ),
+    );
     this.mark(this.#chosen);
     if (focused?.isConnected) focused.focus();
   }

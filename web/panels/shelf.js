@@ -60,7 +60,7 @@ export class Shelf {
     find("forget-saved").addEventListener("click", () => this.#forget(this.shown.current ?? ""));
     this.#list();
     this.scenes.fill(
-      library.scenes.map(({ name, title }) => ({ value: name, title, label: short(title) })),
+      library.scenes.map(({ name, title, group }) => ({ value: name, title, label: short(title), group })),
       (image, name) => thumbnails.place(image, "scenes", name),
     );
   }
