@@ -7,6 +7,7 @@ import io
 import numpy as np
 import pytest
 import trimesh
+from trimesh.visual import ColorVisuals
 
 from service.presets import lettering
 from service.presets.generated import ASSETS, asset
@@ -16,10 +17,15 @@ MESHES = [name for name in ASSETS if asset(name).startswith(b"ply")]
 BODIES = ("tumbler", "whisky", "water-glass", "water", "ice", "wax", "flame", "flame-foot", "perfume-bottle")
 
 
+def read(content: bytes) -> trimesh.Trimesh:
+    mesh = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
 def loaded(name: str, merged: bool = False) -> trimesh.Trimesh:
     """`merged`: vertices that differ only in their normals or coordinates are one."""
-    mesh = trimesh.load(io.BytesIO(asset(name)), file_type="ply", process=False)
-    assert isinstance(mesh, trimesh.Trimesh)
+    mesh = read(asset(name))
     if merged:
         mesh.merge_vertices(merge_norm=True, merge_tex=True, digits_vertex=5)
     return mesh
@@ -82,7 +88,7 @@ def test_a_liquid_reaches_into_its_glass(glass: str, filling: str) -> None:
 
 def test_labels_are_read_from_the_left() -> None:
     """An L has its foot on the right of its stem."""
-    mesh = trimesh.load(io.BytesIO(lettering.written([("L", 0, 0, 0)], 1)), file_type="ply", process=False)
+    mesh = read(lettering.written([("L", 0, 0, 0)], 1))
     centers = mesh.vertices.reshape(-1, 4, 3).mean(axis=1)[:, :2].tolist()
     assert sorted(centers) == [[0.5, y - 2.0] for y in range(5)] + [[1.5, -2.0], [2.5, -2.0]]
     assert (mesh.face_normals[:, 2] > 0).all()
@@ -90,6 +96,7 @@ def test_labels_are_read_from_the_left() -> None:
 
 def test_the_cyclorama_is_brightest_where_the_subject_stands() -> None:
     mesh = loaded("cyclorama")
+    assert isinstance(mesh.visual, ColorVisuals)
     light = mesh.visual.vertex_colors[:, 0].astype(float)
     far = np.linalg.norm(mesh.vertices, axis=1)
     assert far[light.argmax()] < 1 and light[far > 8].max() < 0.25 * light.max()

@@ -296,10 +296,10 @@ OFTEN = {"cornell-boxes", "cornell-spheres", "sphere-on-floor", "diffuse", "blin
 
 @pytest.mark.parametrize("name", seldom(SCENES, set(SCENES) - OFTEN))
 def test_every_scene_renders(gpu: Renderer, store: AssetStore, name: str) -> None:
-    """And is neither black nor white at exposure 0, where nobody has touched it."""
+    """And is neither black nor white at exposure 0, where nobody has touched it; some are dark rooms."""
     color = rendered(gpu, store, presets.get("scenes", name))[..., :3]
     assert np.isfinite(color).all()
-    assert 0.05 < np.median(color) < 1.0 and color.std() > 0.02
+    assert np.quantile(color, 0.98) > 0.1 and np.median(color) < 1.0 and color.std() > 0.02
 
 
 # What makes kernels long where it comes together.

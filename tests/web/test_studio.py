@@ -140,6 +140,12 @@ def test_scenes_and_environments_are_pictures(editor: Editor) -> None:
     page.get_by_role("tab", name="Scenes").click()
     scenes = page.get_by_role("listbox", name="Scenes")
     editor.leafed("scenes")
+    assert scenes.get_by_role("option").first.get_attribute("aria-label") == "Shader ball"
+    tests = scenes.get_by_role("group", name="Tests")
+    assert tests.get_by_role("option", name="Cornell box, empty").count() == 1
+    assert tests.get_by_role("option").last.evaluate(
+        "node => node === [...document.querySelectorAll('#scenes [role=option]')].at(-1)"
+    )
     scenes.get_by_role("option", name="Two point lights").click()
     editor.wait("its name", lambda: editor.text("#scene-title") == "Two point lights")
     assert scenes.get_by_role("option", selected=True).get_attribute("aria-label") == "Two point lights"
