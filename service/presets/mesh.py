@@ -10,6 +10,8 @@ import numpy as np
 
 from service.presets import ply
 
+# Of normals that come from differences, whose last digits are another machine's: assets are named by their bytes.
+DIGITS = 4
 Curve = tuple[np.ndarray, np.ndarray]  # points and outward unit normals (n, 2)
 
 
@@ -124,7 +126,7 @@ def bent_normals(grid: np.ndarray, rough: np.ndarray, closed: bool = False) -> n
     normal = np.cross(along, np.gradient(grid, axis=1))
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     normal = np.where(length > 1e-12, normal / np.maximum(length, 1e-12), rough)
-    return np.asarray(np.where((normal * rough).sum(-1, keepdims=True) < 0, -normal, normal))
+    return np.asarray(np.where((normal * rough).sum(-1, keepdims=True) < 0, -normal, normal)).round(DIGITS)
 
 
 def rounded_box(
@@ -177,7 +179,7 @@ def _moved(
     facing = np.cross(moved(points + step * one, normals) - at, moved(points + step * two, normals) - at)
     out = moved(points + step * normals, normals) - at  # on the other side where `moved` mirrors
     facing *= np.sign((facing * out).sum(-1, keepdims=True))
-    return at, facing / np.linalg.norm(facing, axis=-1, keepdims=True)
+    return at, (facing / np.linalg.norm(facing, axis=-1, keepdims=True)).round(DIGITS)
 
 
 def denser(points: np.ndarray, step: float) -> np.ndarray:

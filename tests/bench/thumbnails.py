@@ -20,7 +20,7 @@ from service.presets import physically_based
 FOLDER = Path(__file__).resolve().parents[2] / "web" / "thumbnails"
 SETTINGS = {
     "materials": {"width": 112, "height": 112, "max_samples": 256, "max_bounces": 12, "seed": 1},
-    "scenes": {"width": 168, "height": 112, "max_samples": 256, "max_bounces": 12, "seed": 1},
+    "scenes": {"width": 168, "height": 112, "max_samples": 96, "max_bounces": 12, "seed": 1, "denoise": True},
     "environments": {"width": 112, "height": 112, "max_samples": 64, "max_bounces": 4, "seed": 1},
 }
 PATIENCE_S = 900.0
