@@ -26,7 +26,7 @@ from service.bench import machine
 
 SCENE = "sphere-on-floor"  # the editor's default
 SIZE = 512
-SUBJECT = "subject"  # the material of every built-in scene that is there to be changed
+SUBJECT = "subject"  # the material that is there to be changed; other scenes' first shape has theirs
 MOVES = 60
 PAUSE_S = 0.15  # between slider moves: the pace of a hand; the picture goes on refining meanwhile
 PATIENCE_S = 60.0
@@ -125,8 +125,10 @@ class Editor:
     def move(self) -> float:
         """Milliseconds from sending a slider's new value to having the first frame that shows it."""
         value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
-        slider = "albedo" if self.scene["materials"][SUBJECT]["type"] == "diffuse" else "roughness"
-        return self.change({"materials": {SUBJECT: {slider: value}}})
+        materials = self.scene["materials"]
+        name = SUBJECT if SUBJECT in materials else self.scene["shapes"][0]["material"]
+        slider = {"diffuse": "albedo", "openpbr": "specular_roughness"}.get(materials[name]["type"], "roughness")
+        return self.change({"materials": {name: {slider: value}}})
 
     def turn(self) -> float:
         """The same of a camera that goes half a degree around what it looks at."""

@@ -35,7 +35,7 @@ GRID = (0.0, 0.25, 0.5, 0.75, 1.0)
 GRID_SPECULAR = (0.0, 0.25, 0.5, 1.0)
 
 RADIUS, PITCH = 0.45, 1.0  # metres
-LETTERS = 0.05  # metres of a square of the labels' letters
+LETTERS = 0.06  # metres of a square of the labels' letters
 INK = {"type": "diffuse", "albedo": 0.01}
 
 
@@ -79,8 +79,8 @@ def parameter_grid() -> dict[str, Any]:
                 x, y = (block % 2 - 0.5) * apart, (0.5 - block // 2) * apart
                 shapes.append(_ball(x + column - middle, y + row - middle, name))
     title = "Disney grid: metallic, roughness, specular"
-    chart = _chart(title, "disney-grid-labels", materials, shapes, distance=26.5)
-    chart["camera"] |= {"position": [-0.3, 0.1, 26.5], "target": [-0.3, 0.1, 0]}
+    chart = _chart(title, "disney-grid-labels", materials, shapes, distance=24.6)
+    chart["camera"] |= {"position": [-0.5, -0.15, 24.6], "target": [-0.5, -0.15, 0]}
     return chart
 
 

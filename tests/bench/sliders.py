@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from service.scene.schema import schema
@@ -58,8 +58,16 @@ def sliders(document: Json) -> list[Slider]:
             model = _models(scene, "Material")[material["type"]]
             found += _of(scene, model, material, ("materials", name))
     for i, light in enumerate(document.get("lights", [])):
-        found += _of(scene, _models(scene, "Light")[light["type"]], light, ("lights", i))
+        for slider in _of(scene, _models(scene, "Light")[light["type"]], light, ("lights", i)):
+            found.append(_within_its_cone(slider, light))
     return found
+
+
+def _within_its_cone(slider: Slider, light: Json) -> Slider:
+    """A beam's inner angle ends at its outer one."""
+    if slider.path[-1] == "inner_angle":
+        return replace(slider, high=light["outer_angle"])
+    return replace(slider, low=light["inner_angle"]) if slider.path[-1] == "outer_angle" else slider
 
 
 def _models(scene: Json, ending: str) -> dict[str, Json]:
