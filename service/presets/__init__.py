@@ -11,6 +11,7 @@ mesh           grids, turned curves and rounded boxes, of which the things in sc
 glassware, candle, bottle, watch, orange, car_panel, armchair, cloth, tree  the things in scenes
 field          a thousand spheres
 disney_charts  spheres that show what each parameter of `disney` does
+lettering      words as meshes, for the labels of charts
 knot           a torus knot, as a mesh
 shader_ball    a shader ball, as a mesh
 cyclorama      a floor that becomes a wall, as a mesh
