@@ -25,6 +25,16 @@ def test_a_module_has_its_lines_and_no_comments(server: Server) -> None:
         assert server.http.head(f"/{path}").headers["etag"] == sent.headers["etag"]
 
 
+def test_a_style_sheet_too(server: Server) -> None:
+    styles = server.http.get("/stage.css")
+    assert styles.headers["content-type"].startswith("text/css")
+    source = (WEB / "stage.css").read_text()
+    assert "\n/*" in source and "\n/*" not in styles.text and styles.text.count("\n") == source.count("\n")
+    assert [line for line in styles.text.split("\n") if line] == [
+        line for line in source.split("\n") if line and not line.startswith("/*")
+    ]
+
+
 def test_a_part_of_a_file_is_the_files_own(server: Server) -> None:
     part = server.http.get("/main.js", headers={"range": "bytes=0-9"})
     assert part.status_code == 206 and part.content == (WEB / "main.js").read_bytes()[:10]

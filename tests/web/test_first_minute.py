@@ -91,6 +91,31 @@ def test_the_last_picture_of_a_scene_stands_until_the_next_is_there(
     assert editor.complaints == []
 
 
+def test_the_first_picture_comes_with_the_page(editor: Editor, server: Server) -> None:
+    """Before any other code, where the live one will be; but not to whoever has work, or follows a link."""
+    page = editor.page.context.new_page()
+    page.route("**/main.js", lambda route: route.abort())
+    page.goto(server.url)
+    first, stage = page.locator("#last-picture"), page.locator("main")
+    assert first.is_visible() and first.evaluate("image => image.complete && image.naturalWidth") == 1440
+    for width, height in ((1440, 900), (390, 844), (1440, 500)):
+        page.set_viewport_size({"width": width, "height": height})
+        box, room = first.bounding_box(), stage.bounding_box()
+        assert box is not None and room is not None
+        tall = min(room["height"], room["width"] * 9 / 16)
+        assert [box["width"], box["height"]] == pytest.approx([room["width"], tall], abs=1)
+        assert box["y"] + box["height"] / 2 == pytest.approx(room["y"] + room["height"] / 2, abs=1)
+    page.goto("about:blank")
+    page.goto(f"{server.url}/#scene=cornell-boxes")
+    assert first.is_hidden()
+    page.goto(server.url)
+    page.evaluate("localStorage['sunbox.work x'] = '{}'")
+    page.reload()
+    assert first.is_hidden()
+    page.evaluate("delete localStorage['sunbox.work x']")
+    page.close()
+
+
 def test_the_page_is_laid_out_before_its_code_runs(editor: Editor, server: Server) -> None:
     """Nothing that has a place of its own moves when the page comes to life."""
     early = editor.page.context.new_page()

@@ -1,10 +1,11 @@
-// The picture that was last seen of a scene, until its first frame is there.
+// The picture that was last seen of a scene, until its first frame is there. The first scene's comes with the page.
 
 import { recall, remember } from "../lib/browser-storage.js";
 
 const NAME = "last picture ";
 const WORK = "work"; // a scene that was changed; a built-in one has its own name
 const LONGEST = 960; // pixels of the longer side: some 50 kB
+const FIRST = "shader-ball"; // the scene of the page's own picture
 const FADE_MS = 300; // until the first frame covers it
 
 // What a picture is of: {name, of}; `builtIn` is the name of a built-in scene as it comes, else null.
@@ -21,8 +22,10 @@ export class LastPicture {
 
   // Shows what is kept of a subject, if there is something.
   async show({ name, of }) {
+    if (name !== FIRST) this.image.hidden = true;
     const kept = await recall(NAME + name);
     if (!kept || kept.of !== of || this.#isOver) return;
+    this.image.classList.remove("first");
     this.image.src = URL.createObjectURL(kept.blob);
     this.image.hidden = false;
   }
