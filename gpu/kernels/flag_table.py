@@ -265,6 +265,7 @@ _ROWS = (
     _of_textures("HAS_CHECKERS", _slot(texture_records.SLOT_CHECKER)),
     _of_textures("HAS_NOISES", _slot(texture_records.SLOT_NOISE)),
     _of_textures("HAS_SOLID_TEXTURES", _slot(texture_records.SLOT_SOLID)),
+    _of_textures("HAS_PROJECTIONS", _slot(texture_records.SLOT_PROJECTED)),
     _of_textures("HAS_RAMPS", _slot(texture_records.SLOT_RAMP)),
     _of_textures("HAS_UVS", lambda s: len(s.triangle_uvs) > 0),
     _of_textures("HAS_UVS_1", lambda s: len(s.triangle_uvs_1) > 0),

@@ -1,4 +1,5 @@
-"""The recipes of textures that are computed, as GLSL, and the spaces of shapes, in which solid ones lie."""
+"""The recipes of textures that are computed, as GLSL, and the spaces of shapes, in which solid ones and
+projections lie."""
 
 from __future__ import annotations
 
@@ -55,7 +56,7 @@ vec4 texture_stop_load(uint i, uint k, uint stop) {{
     return uintBitsToFloat(material_words[texture_recipe_first(i, k) + {RECIPE_GROUPS}u + stop]);
 }}
 #endif
-#if HAS_SOLID_TEXTURES
+#if HAS_SOLID_TEXTURES || HAS_PROJECTIONS
 {_struct(ShapeSpace)}
 layout(binding = {bindings.SPACES_TEXTURE}) uniform usampler2D space_texels;
 ShapeSpace shape_space_load(uint i) {{

@@ -16,6 +16,8 @@ SLOT_NORMALS, SLOT_LEVELS = 1 << 6, 1 << 7  # an image of normals, and one with 
 # or over an image or a checker. The number of the recipe, that of the slot, stands above them.
 SLOT_NOISE, SLOT_SOLID, SLOT_TURBULENCE, SLOT_COORDINATES = (1 << i for i in range(8, 12))
 SLOT_RAMP, SLOT_RAMP_CONSTANT, SLOT_RAMP_SMOOTH, SLOT_RAMP_REPEAT, SLOT_RAMP_MIRROR = (1 << i for i in range(12, 17))
+# Coordinates by the shape's own space: by the side of a box that the surface faces, or all round a ball.
+SLOT_PROJECTED, SLOT_ROUND = 1 << 17, 1 << 18
 SLOT_NUMBER_SHIFT = 24
 SLOT_MADE = SLOT_NOISE | SLOT_COORDINATES | SLOT_RAMP  # a slot with one of these has a recipe
 CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a

@@ -12,7 +12,7 @@ from service.pack.textures.images import PackedTexels
 from service.pack.textures.recipes import listed
 from service.pack.textures.uses import TextureReference
 from service.pack.textures.words import record_of, values_of
-from service.scene.texture import CheckerTexture, ImageTexture
+from service.scene.texture import CheckerTexture, ImageTexture, is_projected
 
 # Barycentric places at which a triangle's emission is evaluated: the middles of the 16 quarters of its quarters.
 _EDGE = np.arange(4)
@@ -76,6 +76,8 @@ def _triangles(
     mine = np.flatnonzero((built.lights["kind"] == LightKind.TRIANGLE) & (built.lights["material"] == use.material))
     if use.ramp is not None or not isinstance(use.texture, ImageTexture | CheckerTexture):
         return  # they are alike all over, or vary with places that are not known here
+    if is_projected(use.texture):
+        return
     second = isinstance(use.texture, ImageTexture) and use.texture.uv == 1
     uvs = built.triangle_uvs_1 if second else built.triangle_uvs
     if not len(mine) or len(uvs) != len(built.shapes[ShapeKind.TRIANGLE]):

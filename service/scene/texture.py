@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
 
 from service.scene.base import OMITTABLE, Model, hint, refusal
 from service.scene.color import Factors, Radiometric, Reflectance
@@ -37,6 +37,15 @@ def _pair(value: Any) -> Vec2:
 
 Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(vector_schema(size=2))]
 
+Mapping = Annotated[
+    Literal["uv", "box", "sphere"],
+    hint(
+        "Mapping",
+        "uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box "
+        "shows the texture once a metre on the side that faces, sphere once around the middle.",
+    ),
+]
+
 
 class ImageTexture(Model):
     """An image file; row 0 is v = 1, texel centres lie at (i + 0.5) / n."""
@@ -50,6 +59,7 @@ class ImageTexture(Model):
     wrap: Annotated[
         Literal["repeat", "clamp", "mirror"], hint("Wrap", "What lies outside of the image, in both directions.")
     ] = "repeat"
+    mapping: Mapping = "uv"
     scale: Annotated[
         Pair, hint("Scale", "Factors on u and v, applied first: 2 shows the image twice.", unit="", widget="number")
     ] = (1.0, 1.0)
@@ -68,6 +78,12 @@ class ImageTexture(Model):
         int, Field(ge=0, le=1), hint("UV set", "Of a mesh's two sets of coordinates.", unit="", widget="number")
     ] = 0
 
+    @model_validator(mode="after")
+    def _reads_what_it_names(self) -> Self:
+        if self.mapping != "uv" and self.uv != 0:
+            raise refusal(f"belongs to mapping 'uv'; mapping {self.mapping!r} reads no coordinates", at="/uv")
+        return self
+
 
 class CheckerTexture(Model):
     """Two colours by turns: the first where floor(u scale_u) + floor(v scale_v) is even."""
@@ -76,6 +92,7 @@ class CheckerTexture(Model):
     a: Annotated[Radiometric, hint("First", "Of the square at u = v = 0.", unit="", widget="color", soft=1)]
     b: Annotated[Radiometric, hint("Second", "Of its neighbours.", unit="", widget="color", soft=1)]
     scale: Annotated[Pair, hint("Scale", "How many squares along u and v.", unit="", widget="number")] = (8.0, 8.0)
+    mapping: Mapping = "uv"
 
 
 def _kind(value: Any) -> Any:
@@ -142,6 +159,11 @@ class HeightTexture(_Reference):
         bool, hint("In the shading", "Off: only shapes with displacement show it, as where a normal map shows the "
                                      "same relief.")
     ] = True  # fmt: skip
+
+
+def is_projected(texture: object) -> bool:
+    """True where a texture lies in the shape's own space: it reads no texture coordinates."""
+    return isinstance(texture, ImageTexture | CheckerTexture) and texture.mapping != "uv"
 
 
 VALUE_TAG, REFERENCE_TAG = "<value>", "<reference>"

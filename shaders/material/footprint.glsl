@@ -8,6 +8,10 @@ struct Footprint {
 #if HAS_UVS_1
     vec4 axes_1; // of the second set
 #endif
+#if HAS_PROJECTIONS
+    vec3 along;  // the axes themselves, in the world
+    vec3 across;
+#endif
 #else
     float unused; // a struct must have a member; every kernel with textures passes footprints on
 #endif
@@ -17,13 +21,19 @@ const float FOOTPRINT_GRAZING = 1e-4; // the least cosine, as a footprint would 
 
 // A lookup of a single point, whose texels are filtered bilinearly.
 Footprint footprint_none() {
-#if ANY_FOOTPRINTS && HAS_UVS_1
-    return Footprint(vec4(0.0), vec4(0.0));
-#elif ANY_FOOTPRINTS
-    return Footprint(vec4(0.0));
-#else
-    return Footprint(0.0);
+    Footprint f;
+#if ANY_FOOTPRINTS
+    f.axes = vec4(0.0);
+#if HAS_UVS_1
+    f.axes_1 = vec4(0.0);
 #endif
+#if HAS_PROJECTIONS
+    f.along = f.across = vec3(0.0);
+#endif
+#else
+    f.unused = 0.0;
+#endif
+    return f;
 }
 
 // The footprint of a cone that has `width` where it meets the surface along d.
@@ -37,6 +47,10 @@ Footprint footprint_make(SurfacePoint at, vec3 d, float width) {
 #if HAS_UVS_1
     f.axes_1 = vec4(dot(at.grow_u_1, along), dot(at.grow_v_1, along), dot(at.grow_u_1, across),
                     dot(at.grow_v_1, across));
+#endif
+#if HAS_PROJECTIONS
+    f.along = along;
+    f.across = across;
 #endif
 #endif
     return f;
@@ -54,4 +68,16 @@ mat2 footprint_in(TextureSlot s, Footprint f) {
     return mat2(0.0);
 #endif
 }
+
+#if HAS_PROJECTIONS
+// Likewise, for coordinates of these gradients.
+mat2 footprint_along(TextureSlot s, Footprint f, vec3 grow_u, vec3 grow_v) {
+#if ANY_FOOTPRINTS
+    mat2 axes = mat2(dot(grow_u, f.along), dot(grow_v, f.along), dot(grow_u, f.across), dot(grow_v, f.across));
+    return mat2(dot(s.turn.xy, axes[0]), dot(s.turn.zw, axes[0]), dot(s.turn.xy, axes[1]), dot(s.turn.zw, axes[1]));
+#else
+    return mat2(0.0);
+#endif
+}
+#endif
 #endif

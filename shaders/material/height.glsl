@@ -23,6 +23,10 @@ mat2x3 height_chart(SurfacePoint at, TextureSlot s, vec3 n) {
 #if HAS_UVS_1
     if ((s.flags & TEXTURE_SLOT_UV_1) != 0u) chart = at.chart_1;
 #endif
+#if HAS_PROJECTIONS
+    mat2x3 projected = projection_chart(projection_make(s, at), n);
+    if ((s.flags & TEXTURE_SLOT_PROJECTED) != 0u) chart = projected;
+#endif
 #if HAS_SOLID_TEXTURES
     Basis along = basis_make(n);
     if ((s.flags & TEXTURE_SLOT_SOLID) != 0u) chart = mat2x3(along.x, along.y);

@@ -1,5 +1,6 @@
 // Texels that are computed: noise, and ramps over it, over a coordinate or over the texel of an image or a checker.
 #include "material/noise.glsl"
+#include "material/projection.glsl"
 
 #if HAS_NOISES || HAS_RAMPS
 #if HAS_NOISES
@@ -7,9 +8,7 @@
 vec3 recipe_place(TextureSlot s, SurfacePoint at, vec2 uv) {
     vec3 p = vec3(uv, 0.0);
 #if HAS_SOLID_TEXTURES
-    ShapeSpace own = shape_space_load(at.shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN));
-    vec3 q = vec3(dot(own.row_x, at.p), dot(own.row_y, at.p), dot(own.row_z, at.p))
-           + vec3(own.move_x, own.move_y, own.move_z);
+    vec3 q = space_place(space_of(at), at.p);
     if ((s.flags & TEXTURE_SLOT_SOLID) != 0u) p = q;
 #endif
     return p;

@@ -187,19 +187,27 @@ vec4 texture_filtered(TextureSlot s, vec2 uv, mat2 spread) {
     return c;
 }
 
-// The slot's own coordinates of a point.
-vec2 texture_uv(TextureSlot s, SurfacePoint at) {
+// The slot's own coordinates of a point, and the footprint in them.
+vec2 texture_uv(TextureSlot s, SurfacePoint at, Footprint footprint, out mat2 spread) {
     vec2 uv = at.uv;
+    spread = footprint_in(s, footprint);
 #if HAS_UVS_1
     if ((s.flags & TEXTURE_SLOT_UV_1) != 0u) uv = at.uv_1;
+#endif
+#if HAS_PROJECTIONS
+    Projection by = projection_make(s, at);
+    bool projected = (s.flags & TEXTURE_SLOT_PROJECTED) != 0u;
+    if (projected) uv = by.uv;
+    if (projected) spread = footprint_along(s, footprint, by.grow_u, by.grow_v);
 #endif
     return vec2(dot(s.turn.xy, uv), dot(s.turn.zw, uv)) + vec2(s.offset_u, s.offset_v);
 }
 
 // `made`: whether the slot has a recipe in some material.
 vec4 texture_sample(TextureSlot s, SurfacePoint at, Footprint footprint, bool made) {
-    vec2 uv = texture_uv(s, at);
-    vec4 c = texture_filtered(s, uv, footprint_in(s, footprint));
+    mat2 spread;
+    vec2 uv = texture_uv(s, at, footprint, spread);
+    vec4 c = texture_filtered(s, uv, spread);
 #if HAS_NOISES || HAS_RAMPS
     if (made && (s.flags & TEXTURE_SLOT_MADE) != 0u) c = recipe_texel(s, at, uv, c);
 #endif
@@ -289,6 +297,13 @@ vec3 texture_bent(SurfacePoint at, vec3 n, vec4 texel, TextureSlot s, float stre
     vec2 u = s.turn.xz, v = s.turn.yw;
     t.xy = vec2(dot(t.xy, u) * inversesqrt(max(dot(u, u), 1e-30)), dot(t.xy, v) * inversesqrt(max(dot(v, v), 1e-30)));
     t.xy *= strength;
+#if HAS_PROJECTIONS
+    mat2x3 chart = projection_chart(projection_make(s, at), n);
+    if ((s.flags & TEXTURE_SLOT_PROJECTED) != 0u) {
+        at.tangent = chart[0];
+        at.handed = dot(cross(n, chart[0]), chart[1]) < 0.0 ? -1.0 : 1.0;
+    }
+#endif
     vec3 x = at.tangent - dot(at.tangent, n) * n;
     float x2 = dot(x, x);
     x *= inversesqrt(max(x2, 1e-30));

@@ -243,6 +243,12 @@ SurfacePoint shapes_veil(Hit hit, vec3 o, vec3 d) {
             r.material = tri.material;
             r.shape = tri.shape;
         }
+#if HAS_PROJECTIONS
+        r.ng = normalize(cross(tri.v1 - tri.v0, tri.v2 - tri.v0));
+#if HAS_INSTANCES
+        if (within) r.ng = instance_normal(instance_load(instance_number(hit.id)), r.ng);
+#endif
+#endif
 #if HAS_TEXTURES
         triangle_detail(index, vec3(1.0 - hit.uv.x - hit.uv.y, hit.uv), r);
 #endif

@@ -106,6 +106,7 @@ SCENES: dict[str, Doc] = {
     "NOISES": textured({"base_color": T}, **NOISE, space="uv"),
     "SOLID_TEXTURES": textured({"base_color": T}, **NOISE),
     "RAMPS": textured({"base_color": T}, **RAMP),
+    "PROJECTIONS": textured({"base_color": T}, TRIANGLE, ball("m"), FLOOR, mapping="box"),
     "UVS": textured({"base_color": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}),
     "VERTEX_COLORS": lit({**TRIANGLE, "colors": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}),
     "NORMAL_MAPS": textured({"normal_map": T}, color_space="linear"),

@@ -152,6 +152,9 @@ class CheckerTexture(TypedDict, total=False):
     """Of its neighbours. (0 to 1e+20)"""
     scale: list[float]
     """How many squares along u and v. (default [8.0, 8.0])"""
+    mapping: Literal["uv", "box", "sphere"]
+    """uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box
+    shows the texture once a metre on the side that faces, sphere once around the middle. (default 'uv')"""
 
 
 class ConstantEnvironment(TypedDict, total=False):
@@ -357,6 +360,9 @@ class ImageTexture(TypedDict, total=False):
     """Without it 8-bit images in colours are sRGB, all others linear; alpha always is."""
     wrap: Literal["repeat", "clamp", "mirror"]
     """What lies outside of the image, in both directions. (default 'repeat')"""
+    mapping: Literal["uv", "box", "sphere"]
+    """uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box
+    shows the texture once a metre on the side that faces, sphere once around the middle. (default 'uv')"""
     scale: list[float]
     """Factors on u and v, applied first: 2 shows the image twice. (default [1.0, 1.0])"""
     rotation: float

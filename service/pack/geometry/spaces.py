@@ -1,4 +1,4 @@
-"""The shapes' own coordinates, in which solid textures lie."""
+"""The shapes' own coordinates, in which solid textures and projections lie."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from service.scene import Scene
 from service.scene.numbers import Vec3
 from service.scene.procedural import NoiseTexture, RampInput, RampTexture
 from service.scene.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
-from service.scene.texture import references
+from service.scene.texture import is_projected, references
 
 
 def shape_spaces(scene: Scene, origin: Vec3) -> np.ndarray:
@@ -40,7 +40,7 @@ def shape_spaces(scene: Scene, origin: Vec3) -> np.ndarray:
 def _is_solid(scene: Scene, texture: object) -> bool:
     if isinstance(texture, RampTexture) and isinstance(texture.input, RampInput):
         texture = scene.textures[texture.input.texture]
-    return isinstance(texture, NoiseTexture) and texture.space == "object"
+    return is_projected(texture) or (isinstance(texture, NoiseTexture) and texture.space == "object")
 
 
 def _middle(shape: Shape) -> Vec3:

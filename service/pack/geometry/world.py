@@ -24,6 +24,7 @@ from service.scene.numbers import LARGEST
 from service.scene.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 from service.system.memory import takes
 
+WITHOUT = "; an image or a checker needs none with mapping 'box' or 'sphere'"
 BYTES_PER_TRIANGLE = 220  # while it is packed; 150 were measured for flat ones, 180 with normals, 216 with tangents
 
 
@@ -130,7 +131,7 @@ def place_analytic(shapes: Sequence[Shape], materials: ShapeMaterials) -> Analyt
             continue
         matrix, used = _matrix(shape), (numbers[shape.material], i)
         if 1 in materials.charts.get(shape.material, RequiredCharts()).uv_sets:
-            raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
+            raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only{WITHOUT}")
         match shape:
             case SphereShape():
                 placed.sphere(shape.center, shape.radius, matrix, used)
@@ -211,7 +212,7 @@ def _check_charts(number: int, shape: MeshShape, data: MeshData, sets: frozenset
     for which, uvs in ((0, data.uvs), (1, data.uvs_1)):
         if which in sets and uvs is None:
             field = "uvs" if shape.asset is None and which == 0 else "material" if shape.asset is None else "asset"
-            raise _uncharted(number, field, shape.material, f"uv set {which}, which this mesh does not have")
+            raise _uncharted(number, field, shape.material, f"uv set {which}, which this mesh does not have{WITHOUT}")
 
 
 def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshData]) -> MeshData:

@@ -14,7 +14,7 @@ from service.problems import AssetError, FieldError, InvalidDocument, escaped
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
 from service.scene.shape import MeshShape
-from service.scene.texture import CheckerTexture, HeightTexture, ImageTexture
+from service.scene.texture import CheckerTexture, HeightTexture, ImageTexture, is_projected
 
 CHUNK = 1 << 18  # coordinates at a time, which bounds the memory that they take
 LINEAR = np.array(LINEAR_OF_BYTE)
@@ -104,6 +104,9 @@ def height_fields(scene: Scene, assets: Assets) -> dict[str, HeightField]:
             if not isinstance(texture, ImageTexture | CheckerTexture):
                 detail = f"moves a mesh with displacement: must be an image or a checker, and not a {texture.type}"
                 raise InvalidDocument([FieldError(f"/materials/{escaped(name)}/height/texture", detail)])
+            if is_projected(texture):
+                detail = f"moves a mesh with displacement: must have mapping 'uv', and not {texture.mapping!r}"
+                raise InvalidDocument([FieldError(f"/textures/{escaped(reference.texture)}/mapping", detail)])
             out[name] = HeightField(reference, texture, assets)
             _check_channel(name, out[name])
     return out

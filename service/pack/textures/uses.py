@@ -22,6 +22,7 @@ from service.scene.texture import (
     NormalTexture,
     Reference,
     Texture,
+    is_projected,
     references,
 )
 
@@ -85,7 +86,7 @@ def required_charts(scene: Scene) -> dict[str, RequiredCharts]:
     out = {}
     for name, material in scene.materials.items():
         sets = {key: _uv_set(scene, reference) for key, reference in sampled(material).items()}
-        tangents, height = _tangent_set(material, sets), None
+        tangents, height = _tangent_set(scene, material, sets), None
         if name in displaced and material.height is not None:
             sets["height"] = _uv_set(scene, material.height)
             height = material.height, scene.textures[material.height.texture]
@@ -109,16 +110,18 @@ def _read(scene: Scene, name: str) -> tuple[str, ImageTexture | CheckerTexture |
 
 
 def _uv_set(scene: Scene, reference: Reference) -> int | None:
-    """The set of coordinates that a reference reads; None where it is solid."""
+    """The set of coordinates that a reference reads; None where it lies in the shape's own space."""
     _, texture = _read(scene, reference.texture)
-    if isinstance(texture, NoiseTexture) and texture.space == "object":
+    if is_projected(texture) or (isinstance(texture, NoiseTexture) and texture.space == "object"):
         return None
     return texture.uv if isinstance(texture, ImageTexture) else 0
 
 
-def _tangent_set(material: Material, sets: Mapping[str, int | None]) -> int | None:
-    """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic."""
-    by_member = {member_of(material, key): uv_set for key, uv_set in sets.items()}
+def _tangent_set(scene: Scene, material: Material, sets: Mapping[str, int | None]) -> int | None:
+    """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic. Of a
+    projected normal map kernels know the directions without a chart."""
+    own = {key for key, reference in references(material).items() if is_projected(_read(scene, reference.texture)[1])}
+    by_member = {member_of(material, key): uv_set for key, uv_set in sets.items() if key not in own}
     for name in texture_records.NORMALS:
         if name in by_member:
             return by_member[name] or 0

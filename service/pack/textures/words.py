@@ -28,6 +28,7 @@ from service.scene.texture import (
     NormalTexture,
     Reference,
     ScalarTexture,
+    is_projected,
 )
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
@@ -116,7 +117,7 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
     if isinstance(texture, CheckerTexture):
-        record["flags"] = texture_records.SLOT_CHECKER
+        record["flags"] = texture_records.SLOT_CHECKER | _projection(texture.mapping)
         record["turn"] = (texture.scale[0], 0, 0, texture.scale[1])
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
@@ -125,6 +126,7 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     flags |= texture_records.SLOT_SRGB if use.srgb else 0
     flags |= 0 if image.is_8bit else texture_records.SLOT_FLOATS
     flags |= texture_records.SLOT_UV_1 if texture.uv == 1 else 0
+    flags |= _projection(texture.mapping)
     angle = math.radians(math.fmod(texture.rotation, 360.0))
     c, s = math.cos(angle), math.sin(angle)
     record["first"] = first
@@ -138,6 +140,11 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     record["turn"] = (c * texture.scale[0], -s * texture.scale[1], s * texture.scale[0], c * texture.scale[1])
     record["offset_u"], record["offset_v"] = texture.offset
     return record
+
+
+def _projection(mapping: str) -> int:
+    own = texture_records.SLOT_PROJECTED
+    return {"uv": 0, "box": own, "sphere": own | texture_records.SLOT_ROUND}[mapping]
 
 
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
@@ -193,9 +200,12 @@ def _image_warnings(wanted: Mapping[str, str], images: Mapping[str, ImageData]) 
 
 
 def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[str]:
-    charts = {use.material: getattr(use.texture, "uv", 0) for use in uses if use.member == "normal"}
+    flat = [use for use in uses if isinstance(use.reference, NormalTexture) and not is_projected(use.texture)]
+    charts = {use.material: getattr(use.texture, "uv", 0) for use in flat if use.member == "normal"}
     for use in uses:
         if isinstance(use.reference, NormalTexture):
+            if use not in flat:
+                continue
             own = getattr(use.texture, "uv", 0)
             along = charts.get(use.material, own)
             if own != along:
