@@ -185,6 +185,18 @@ def affine(uv: Tree) -> tuple[Doubles, Doubles] | None:
     return (matrix, offset) if bool(error <= CLOSE * (1 + np.abs(expected).max())) else None
 
 
+def scaled(position: Tree) -> float | None:
+    """The number by which a tree multiplies the position on a surface; None where it does something else."""
+    if position.operation == "position":
+        return 1.0
+    if position.operation not in ("multiply", "divide"):
+        return None
+    by, own = fixed(position.inputs["in2"]), scaled(position.inputs["in1"])
+    if by is None or own is None or np.ptp(by) or not by[0]:
+        return None
+    return own * float(by[0]) if position.operation == "multiply" else own / float(by[0])
+
+
 def factors(tree: Tree, image: Tree) -> tuple[Doubles, list[int]] | None:
     """For a tree that reads one image alone and multiplies its channels: the factor of each of its numbers, and the
     channel; None where it does something else."""

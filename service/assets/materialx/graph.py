@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
-from service.assets.materialx.evaluation import fixed
+from service.assets.materialx.evaluation import fixed, scaled
 from service.assets.materialx.images import Images
-from service.assets.materialx.trees import Tree, Unsupported, applied
+from service.assets.materialx.trees import Tree, Unsupported, applied, constant, times, walk
 from service.assets.scenes.warnings import Warnings
 
 MOST_TREES = 20_000
@@ -168,6 +168,8 @@ class Graphs:
         definition, kind = node.getNodeDef(TARGET), node.getCategory()
         if definition is None:
             raise Unsupported(f"the node <{kind[:40]}> is not one of the standard library, nor fit its inputs")
+        if kind == "triplanarprojection":
+            return self._projected(node, definition, scope)
         implementation = definition.getImplementation(TARGET)
         if implementation is not None and implementation.getCategory() == "nodegraph":
             return self._taken_apart(node, definition, implementation, output, scope)
@@ -203,9 +205,38 @@ class Graphs:
         names = [one.getName() for one in graph.getOutputs()]
         return self.output(graph, output if output in names else "", inner)
 
-    def _image(self, node: Any, definition: Any, type: str, scope: Scope | None) -> Tree:
+    def _projected(self, node: Any, definition: Any, scope: Scope | None) -> Tree:
+        """A projection along the axes, as an image by box."""
+        place, files = (
+            self.place(node.getNamePath()),
+            [self._text(node, definition, f"file{k}", scope) for k in "xyz"],
+        )
+        named = [k for k, (name, _) in zip("xyz", files, strict=True) if name]
+        side = named[0] if named else "x"
+        if len({name for name, _ in files}) > 1:
+            self.notes.add(place, f"an image for each axis is not supported; file{side} is used on all sides")
+        self.notes.add(place, "a projection along the axes is not blended where they meet; its image is seen from "
+                              "outside, +Y up, and nowhere mirrored")  # fmt: skip
+        scale = scaled(self._input(node, definition, "position", scope))
+        if scale is None:
+            self.notes.add(
+                f"{place}/position", "positions other than a number times the shape's own are not supported"
+            )
+        type = definition.getActiveOutputs()[0].getType()
+        by_box = Tree("texcoord", 2) if scale in (None, 1) else times(Tree("texcoord", 2), constant(scale or 1.0))
+        found = self._image(node, definition, type, scope, (f"file{side}", by_box))
+        # A colour of a space of its own is several operations on the image.
+        for one in walk(found):
+            if one.operation == "image" and one.inputs["texcoord"] is by_box:
+                one.texts["mapping"] = "box"
+        return found
+
+    def _image(
+        self, node: Any, definition: Any, type: str, scope: Scope | None, by: tuple[str, Tree] | None = None
+    ) -> Tree:
+        """The tree of an image node, or of a projection `by` one of its files and with these coordinates."""
         size, place = SIZES[type], self.place(node.getNamePath())
-        name, space = self._text(node, definition, "file", scope)
+        name, space = self._text(node, definition, "file" if by is None else by[0], scope)
         try:
             file = self.images.located(name, self.file)
         except Unsupported as problem:
@@ -218,10 +249,11 @@ class Graphs:
             self.notes.add(place, "nearest-neighbour filtering is not supported; bilinear filtering is used instead")
         if "constant" in (texts["wrap_u"], texts["wrap_v"]):
             self.notes.add(place, "a constant colour beyond the image is not supported; its edge goes on instead")
-        for ignored in ("layer", "framerange"):
+        for ignored in ("layer" if by is None else f"layer{by[0][-1]}", "framerange"):
             if self._text(node, definition, ignored, scope)[0]:
                 self.notes.add(f"{place}/{ignored}", "is not supported and is ignored")
-        image = Tree("image", size, {"texcoord": self._input(node, definition, "texcoord", scope)}, texts=texts)
+        at = self._input(node, definition, "texcoord", scope) if by is None else by[1]
+        image = Tree("image", size, {"texcoord": at}, texts=texts)
         if type not in COLOURS:
             return image
         if self._space(space, place) == "srgb_texture":

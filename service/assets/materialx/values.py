@@ -149,7 +149,7 @@ class Values:
             return None  # channels change places
         if 3 in channels and not self._has_alpha(image):
             return None
-        settings = {"color_space": image.texts["space"]} | self._wrap(image) | placing
+        settings = {"color_space": image.texts["space"]} | self._settings(image) | placing
         key = image.texts["file"], repr(settings)
         if key not in self._names:
             file = image.texts["file"]
@@ -160,11 +160,13 @@ class Values:
     def _has_alpha(self, image: Tree) -> bool:
         return bool(self.images.decoded(image.texts["file"]).pixels.shape[2] == 4)
 
-    def _wrap(self, image: Tree) -> dict[str, str]:
+    def _settings(self, image: Tree) -> dict[str, str]:
+        """The wrapping and the mapping of an image, where they are not the usual ones."""
         u, v = (WRAPS.get(image.texts[name], "repeat") for name in ("wrap_u", "wrap_v"))
         if u != v:
             self.notes.add(image.texts["place"], f"{v} in v beside {u} in u is not supported; {u} is used for both")
-        return {} if u == "repeat" else {"wrap": u}
+        mapping = image.texts.get("mapping", "uv")
+        return ({} if u == "repeat" else {"wrap": u}) | ({} if mapping == "uv" else {"mapping": mapping})
 
     def _named(self, file: str, document: dict[str, Any]) -> str:
         name = unique(posixpath.splitext(posixpath.basename(file))[0] or "texture", self.documents)
@@ -194,7 +196,7 @@ class Values:
         scale = max(min(most, high), 1.0)
         document: dict[str, Any] = {"color_space": "linear"}
         if together is not None:
-            document |= self._wrap(together[0]) | together[1]
+            document |= self._settings(together[0]) | together[1]
         if scale != 1:
             texels /= np.float32(scale)
         is_color = tree.size >= 3 and kind != "normals"
@@ -209,7 +211,7 @@ class Values:
         where = "" if together is not None else ", which repeats with each unit of the coordinates"
         size = f"{texels.shape[1]} x {texels.shape[0]}"
         self.notes.add(place, f"the graph is computed as an image of {size} texels{where}")
-        if reads(tree, "position"):
+        if reads(tree, "position") or (together is None and any("mapping" in one.texts for one in images_in(tree))):
             self.notes.add(place, "a pattern in space is not supported; it lies in the texture's coordinates instead")
         return self._names[key]
 
@@ -219,10 +221,10 @@ class Values:
         if reads(tree, "texcoord", "heighttonormal", *GEOMETRY):
             return None
         images = images_in(tree)
-        placed = [(affine(one.inputs["texcoord"]), self._wrap(one)) for one in images]
+        placed = [(affine(one.inputs["texcoord"]), self._settings(one)) for one in images]
         first = placed[0]
-        for map, wrap in placed:
-            if map is None or first[0] is None or wrap != first[1]:
+        for map, settings in placed:
+            if map is None or first[0] is None or settings != first[1]:
                 return None
             if not all(np.allclose(a, b, atol=1e-6) for a, b in zip(map, first[0], strict=True)):
                 return None

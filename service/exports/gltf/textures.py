@@ -17,7 +17,7 @@ from service.exports.losses import Losses
 from service.exports.writing import Files, Limits
 from service.problems import AssetError, FieldError, InvalidDocument, TooLarge, escaped
 from service.scene import Scene
-from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, Reference
+from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, Reference, is_projected
 
 WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
 LINEAR, MIPMAPS = 9729, 9987  # filters: between texels, and between levels as well
@@ -107,6 +107,10 @@ class Textures:
             texture = self._texture(plane.reference)
             if not isinstance(texture, ImageTexture | CheckerTexture):
                 self.losses.add(plane.pointer, "textures of this kind have no place in glTF; its factor is written")
+                kept.append(Plane(pointer=plane.pointer))
+            elif is_projected(texture):
+                detail = f"glTF has texture coordinates alone, and none by {texture.mapping}; its factor is written"
+                self.losses.add(plane.pointer, detail)
                 kept.append(Plane(pointer=plane.pointer))
             elif first is None or self._placed(self._texture(first.reference)) == self._placed(texture):  # type: ignore[arg-type]
                 first = first or plane

@@ -13,7 +13,14 @@ from service.exports.losses import Losses
 from service.exports.writing import Files
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
 from service.scene import Scene
-from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, ScalarTexture
+from service.scene.texture import (
+    CheckerTexture,
+    ColorTexture,
+    ImageTexture,
+    NormalTexture,
+    ScalarTexture,
+    is_projected,
+)
 
 WRAPS = {"repeat": "periodic", "clamp": "clamp", "mirror": "mirror"}
 SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}
@@ -187,6 +194,8 @@ class Graph:
         """The node that reads a texture; None, with a loss, where there is none."""
         texture = self.images.scene.textures[value.texture]
         if isinstance(texture, CheckerTexture) and type in ("color3", "float"):
+            if is_projected(texture):
+                self.tell(parameter, f"a checker by {texture.mapping} is written by texture coordinates")
             return self._checker(texture)
         if not isinstance(texture, ImageTexture):
             self.tell(parameter, "textures of this kind are not written as MaterialX; the factor alone is")
@@ -196,11 +205,31 @@ class Graph:
         space = self._space(value, texture)
         own = f' colorspace="{SPACES[space]}"' if type.startswith("color") else ""
         path = escape(self.images.path(value.texture, texture))
+        if texture.mapping == "box":
+            return self._projected(texture, parameter, type, f'type="filename" value="{path}"{own}')
+        if texture.mapping == "sphere":
+            self.tell(parameter, "an image by sphere is written by texture coordinates")
         inputs = [f'<input name="file" type="filename" value="{path}"{own} />', self._placed(texture)]
         if texture.wrap != "repeat":
             mode = WRAPS[texture.wrap]
             inputs += [f'<input name="{axis}addressmode" type="string" value="{mode}" />' for axis in "uv"]
         return self._node("image", type, *inputs)
+
+    def _projected(self, texture: ImageTexture, parameter: str, type: str, file: str) -> str:
+        """The node that shows an image along the axes of the shape's own space."""
+        self.tell(parameter, "MaterialX shows an image by box mirrored on three of its six sides")
+        if texture.scale[0] != texture.scale[1] or texture.rotation or texture.offset != (0, 0):
+            self.tell(parameter, "an image by box keeps its scale along u alone, without rotation and offset")
+        if texture.wrap != "repeat":
+            self.tell(parameter, "an image by box repeats in MaterialX")
+        inputs = [f'<input name="file{axis}" {file} />' for axis in "xyz"]
+        if texture.scale[0] != 1:
+            own = self._node("position", "vector3", '<input name="space" type="string" value="object" />')
+            by = input_of("in2", number(texture.scale[0]))
+            place = self._node("multiply", "vector3", input_to("in1", "vector3", own), by)
+            inputs.append(input_to("position", "vector3", place))
+        up = '<input name="upaxis" type="integer" value="1" />'
+        return self._node("triplanarprojection", type, *inputs, up, input_of("blend", number(0.0)))
 
     def _checker(self, texture: CheckerTexture) -> str:
         tiling = input_of("uvtiling", Value("vector2", texture.scale))

@@ -137,6 +137,37 @@ def test_an_image_times_a_constant_stays_as_it_is(store: AssetStore) -> None:
     assert not imported.warnings
 
 
+def test_a_triplanar_projection_is_an_image_by_box(store: AssetStore) -> None:
+    """Its scale is that of the position; one image serves all sides, which is told."""
+    nodes = [
+        node("position", "p", "vector3"),
+        node("multiply", "twice", "vector3", wire("in1", "p", "vector3"), value("in2", 2.0)),
+        node("triplanarprojection", "own", "color3", value("filex", "a.png", "filename", colorspace="srgb_texture"),
+             value("filey", "b.png", "filename"), wire("position", "twice", "vector3")),
+        node("triplanarprojection", "grey", "float", *(value(f"file{k}", "a.png", "filename") for k in "xyz")),
+        node("multiply", "half", "float", wire("in1", "grey", "float"), value("in2", 0.5)),
+    ]  # fmt: skip
+    made = graph(*nodes, color="own color3", rough="half float")
+    shader = surface("open_pbr_surface", from_graph("base_color", "color"),
+                     from_graph("specular_roughness", "rough", "float"))  # fmt: skip
+    imported = taken(store, {"m.mtlx": mtlx(made, shader), "a.png": make.png(NOISY), "b.png": make.png(NOISY)})
+    assert material(imported) == {
+        "type": "openpbr",
+        "base_color": {"texture": "a"},
+        "specular_roughness": {"texture": "a 2", "channel": "r", "factor": 0.5},
+    }
+    textures = imported.document["textures"]
+    assert textures["a"] == {
+        "asset": textures["a"]["asset"],
+        "color_space": "srgb",
+        "mapping": "box",
+        "scale": [2, 2],
+    }
+    assert textures["a 2"] == {"asset": textures["a"]["asset"], "color_space": "linear", "mapping": "box"}
+    told = " ".join(each["detail"] for each in imported.warnings)
+    assert "filex is used on all sides" in told and "computed as an image" not in told
+
+
 def test_displacement_is_heights(store: AssetStore) -> None:
     """A texture less its middle, times a scale: the midlevel is where that is 0."""
     nodes = [

@@ -225,6 +225,8 @@ TOLD: list[tuple[str, dict[str, Any], str]] = [
     ("a model", {"materials": {"m": {"type": "diffuse", "albedo": 0.5}}}, "/materials/m/type"),
     ("a checker", {"materials": {"m": {"type": "principled", "base_color": {"texture": "t"}}},
      "textures": {"t": {"type": "checker", "a": 1, "b": [1, 0, 0]}}}, "/textures/t"),
+    ("a projection", {"materials": {"m": {"type": "principled", "base_color": {"texture": "t"}}},
+     "textures": {"t": {"type": "checker", "a": 1, "b": [1, 0, 0], "mapping": "box"}}}, "/materials/m/base_color"),
     ("an idle material", {"materials": {"m": {"type": "principled"}, "n": {"type": "principled"}}}, "/materials/n"),
 ]  # fmt: skip
 

@@ -157,6 +157,20 @@ def test_each_model_has_its_own_node_and_the_rest_is_told(store: AssetStore) -> 
     assert "/materials/m/type" in {pointer for pointer, _ in other.losses}
 
 
+def test_an_image_by_box_comes_back(store: AssetStore) -> None:
+    """It is a projection along the axes; what that cannot say is told, and what is by sphere is by coordinates."""
+    by_box = {"color_space": "srgb", "mapping": "box", "scale": [3.0, 3.0]}
+    material = {"type": "openpbr", "base_color": {"texture": "t"}}
+    exported = written(store, {"m": material}, {"t": by_box})
+    assert [pointer for pointer, _ in exported.losses] == ["/materials/m/base_color"]
+    (texture,) = again(exported).document["textures"].values()
+    same(texture, {**by_box, "asset": "part:0"})
+    odd = written(store, {"m": material}, {"t": {**by_box, "scale": [3.0, 1.0], "wrap": "clamp"}})
+    assert len(list(odd.losses)) == 3
+    ((_, detail),) = written(store, {"m": material}, {"t": {**by_box, "mapping": "sphere"}}).losses
+    assert "by sphere" in detail
+
+
 def test_it_is_served_and_written_by_the_command(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
