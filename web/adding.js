@@ -1,16 +1,18 @@
 // Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
 
-import { box, isFlat, remember, together } from "./document/bounds.js";
+import { box, isFlat, remember } from "./document/bounds.js";
 import { axes, halfHeight, isInSight } from "./document/camera.js";
 import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { lampShape, standOf, subjectOf } from "./document/lamps.js";
-import { ballOf, solids, union, wayOut } from "./document/placing.js";
+import { isLamp } from "./document/emission.js";
+import { ballOf, floors, lookedAt, middle, sized, solids, standing, union, wayOut } from "./document/placing.js";
 import { moved } from "./document/transforms.js";
 import { add, cross, normalize, scale, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
+const SMALL = 0.2; // of what is made here: what is smaller in the picture is not seen there
 const SUNS_APART = Math.PI / 6; // a copied sun shines from another side
 
 // The angles of a spot's beam that is as wide as what it is aimed at, in degrees.
@@ -41,7 +43,8 @@ export class Adder {
     const { materials } = acts.state.scene;
     const material = fresh(title.toLowerCase(), materials);
     const made = make(acts.camera, this.controller.radius(), material);
-    return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: !isFlat(made) });
+    const around = await this.#surroundings();
+    return this.#put([made], { materials: { [material]: acts.plainMaterial }, around, stands: !isFlat(made) });
   }
 
   // Has all things stand on a "ground" or a "cyclorama", in the place of the one that there was; "none" takes it away.
@@ -118,58 +121,77 @@ export class Adder {
     return placed;
   }
 
-  // A mesh with a material of its own.
-  addMesh(asset, name, around) {
+  // A mesh with a material of its own, called as its file is. Such files do not say their unit: a model that is out of
+  // all proportion becomes as large as its neighbours, by a power of ten, which is promised.
+  async addMesh(asset, { title, name }) {
     const material = fresh(name, this.acts.state.scene.materials);
-    const shape = { type: "mesh", asset, material };
-    return this.#put([shape], {
-      materials: { [material]: this.acts.plainMaterial },
-      around,
-      stands: true,
-      isFramed: true,
-    });
+    const shape = { type: "mesh", name: title, asset, material };
+    const own = box(shape);
+    const around = await this.#surroundings();
+    const beside = lookedAt(around.bodies, this.acts.camera.target);
+    const factor = own ? sized(ballOf(own), beside ? ballOf(beside).radius : this.controller.radius()) : 1;
+    const made = factor === 1 ? shape : { ...shape, transform: { scale: factor } };
+    this.#put([made], { materials: { [material]: this.acts.plainMaterial }, around, stands: true, isFramed: true });
+    return factor;
   }
 
-  // The things of another scene; `around` is the box around them, where that is known.
-  addScene(document, around) {
+  // The things of another scene; `whole` is the box around them, where that is known. Promises how far they were moved.
+  async addScene(document, whole) {
     const { shapes, ...others } = adapted(document, this.acts.state.scene);
-    return this.#put(shapes, {
-      ...others,
-      around: around ?? sizeOf(document, this.acts.cameraOf(document)),
-      stands: true,
-      isFramed: true,
-    });
+    const own = whole ?? sizeOf(document, this.acts.cameraOf(document));
+    return this.#put(shapes, { ...others, own, around: await this.#surroundings(), stands: true, isFramed: true });
   }
 
-  // Adds shapes as one thing, with materials and textures that the scene lacks. `around` is their box where the
-  // shapes themselves don't tell; the camera goes to them where it can't see them, or is to (`isFramed`).
-  async #put(shapes, { materials = {}, textures = {}, around = null, stands = false, isFramed = false }) {
-    const own = around ?? union(shapes.map(box).filter(Boolean));
+  // What stands around, {bodies}, and on what, {grounds}.
+  async #surroundings() {
     const boxes = await this.controller.boxes();
+    const { scene } = this.acts.state;
+    const { position } = this.acts.camera;
+    const isBody = (_, i) => !scene.shapes[i] || !(isFlat(scene.shapes[i]) || isLamp(scene, scene.shapes[i]));
+    return { bodies: solids(boxes.filter(isBody), position), grounds: floors(boxes, position) };
+  }
+
+  // Adds shapes as one thing, with materials and textures that the scene lacks. `own` is their box where the
+  // shapes themselves don't tell; the camera goes to them where it can't see them, or hardly (`isFramed`). Returns how
+  // far they were moved.
+  #put(shapes, { materials = {}, textures = {}, own = union(shapes.map(box).filter(Boolean)), around, ...how }) {
     const { scene, chosen } = this.acts.state;
     const { camera } = this.acts;
-    const bodies = boxes.filter((_, i) => !scene.shapes[i] || !isFlat(scene.shapes[i]));
-    const way = own && wayOut(own, solids(bodies, camera.position), axes(camera).right, { stands });
-    const placed = way ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
-    const stand = own && way ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;
+    const { bodies } = around;
+    const right = axes(camera).right;
+    const aside = () => wayOut(own, bodies, right);
+    const lost = () => !isInSight(camera, this.controller.aspect, { low: middle(own), high: middle(own) });
+    const stood = () => standing(own, { ...around, target: camera.target, right, lost: lost() });
+    const way = own && (how.stands ? stood() : aside());
+    const isMoved = way?.offset.some((x) => x !== 0);
+    const placed = isMoved ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
+    const stand = isMoved ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;
     if (stand) remember(placed, stand);
-    const isSeen = !stand || (!isFramed && isInSight(camera, this.controller.aspect, stand));
+    const isSeen = !stand || (isInSight(camera, this.controller.aspect, stand) && !(how.isFramed && this.#isSmall(stand)));
     this.acts.change({
       scene: {
         ...scene,
         ...(Object.keys(textures).length ? { textures: { ...scene.textures, ...textures } } : {}),
         materials: { ...scene.materials, ...materials },
         shapes: [...scene.shapes, ...placed],
-        camera: isSeen ? scene.camera : { ...scene.camera, ...this.#framed(stand, way?.neighbour) },
+        camera: isSeen ? scene.camera : { ...scene.camera, ...this.#framed(stand, way?.neighbour, bodies) },
       },
       chosen: { ...chosen, thing: pointer("shapes", scene.shapes.length), material: placed[0].material },
     });
+    return isMoved ? way.offset : [0, 0, 0];
   }
 
-  // With the neighbour, unless the new thing would be lost beside it.
-  #framed(stand, neighbour) {
-    const [ball, other] = [stand, neighbour].map((each) => each && ballOf(each));
+  // Whether a thing is hardly seen: its ball is smaller than a new thing's would be.
+  #isSmall(stand) {
+    return ballOf(stand).radius < SMALL * this.controller.radius();
+  }
+
+  // With the neighbour, or with what the camera looks at, unless the new thing would be lost beside that.
+  #framed(stand, neighbour, bodies) {
+    const company = neighbour ?? lookedAt(bodies, this.acts.camera.target);
+    const [ball, other] = [stand, company].map((each) => each && ballOf(each));
     if (!(ball.radius > 0)) return {};
-    return this.controller.framed(other && other.radius < COMPANION * ball.radius ? together([ball, other]) : ball);
+    const isBoth = other && other.radius < COMPANION * ball.radius;
+    return this.controller.framed(isBoth ? ballOf(union([stand, company])) : ball);
   }
 }

@@ -5,16 +5,17 @@
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
-import { accepted, browse, kindOf } from "./lib/files.js";
+import { accepted, browse, checkFile, kindOf } from "./lib/files.js";
 import { isUnderNoSky, studio } from "./document/lighting.js";
 import { unpacked } from "./document/material-set.js";
 import { pointer } from "./lib/patch.js";
 import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
 import { readRecipe } from "./document/recipe.js";
+import { Poses } from "./poses.js";
 import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
 import { pictured } from "./document/textures.js";
-import { inWords } from "./lib/format-text.js";
+import { count, inWords } from "./lib/format-text.js";
 
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
 const ORDER = ["json", "scene", "mesh", "light", "image", "table", "measurement"]; // a texture comes after the mesh that it is for
@@ -23,8 +24,19 @@ const ACCEPT = accepted(ORDER);
 
 const endsIn = (file, ending) => file.name.toLowerCase().endsWith(ending);
 const isMaterialX = (file) => endsIn(file, ".mtlx");
-// What these hold is known when they are there: a scene, or materials.
-const isOpen = (file) => endsIn(file, ".zip") || isMaterialX(file);
+
+// What a file's thing is called: as the file without its ending; a slash would make a group of it.
+const titleOf = (file) =>
+  file.name
+    .replace(/\.[^.]*$/, "")
+    .replaceAll("/", "-")
+    .slice(0, 80) || "Model";
+
+// A scene whose things have names: those that have none in the file are called as the file is.
+const named = (document, file) => ({
+  ...document,
+  shapes: document.shapes.map((shape) => (shape.name ? shape : { ...shape, name: titleOf(file) })),
+});
 
 const stem = (file) =>
   file.name
@@ -34,9 +46,11 @@ const stem = (file) =>
 
 export class Importer {
   // `acts` is the editor, `adder` sets things beside others; `messages` tells; `controller` knows what is seen;
-  // `reopen(recipe, title)` opens what a picture was made from; `thumbnails` are those of textures.
-  constructor({ schema, acts, adder, messages, controller, reopen, thumbnails }) {
-    Object.assign(this, { schema: schema.scene, acts, adder, messages, controller, reopen, thumbnails });
+  // `reopen(recipe, title)` opens what a picture was made from; `thumbnails` are those of textures; `formats()` is what
+  // the server says of files.
+  constructor({ schema, acts, adder, messages, controller, reopen, thumbnails, formats }) {
+    Object.assign(this, { schema: schema.scene, acts, adder, messages, controller, reopen, thumbnails, formats });
+    this.poses = new Poses({ schema: schema.scene, acts, refuse: (file, problem) => this.#refuse(file, problem) });
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
@@ -101,13 +115,15 @@ export class Importer {
       this.reopen(recipe, stem(file));
       return true;
     }
-    const zipped = isOpen(file) ? await this.upload(file) : null;
-    if (zipped?.kind === "materials") return this.#takeMaterials(zipped, file, at);
-    const chosen = kind === "scene" ? (way ?? (await this.#ask(file))) : way;
-    if (kind === "scene" && chosen === null) return false;
-    const info = zipped ?? (await this.upload(file));
-    if (info.kind === "scene") return this.#takeScene(info, file, chosen);
-    if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
+    await checkFile(file, this.formats());
+    const info = await this.upload(file); // before anything is asked: a broken file is no whole scene
+    if (info.kind === "materials") return this.#takeMaterials(info, file, at);
+    if (info.kind === "scene") {
+      this.messages.hide("upload");
+      const chosen = way ?? (await this.#ask(file));
+      return chosen === null ? false : this.#takeScene(info, file, chosen);
+    }
+    if (info.kind === "mesh") return this.#takeMesh(info, file, way);
     if (kind === "table") this.#putTable(info, file);
     else if (kind === "measurement") await this.#takeMeasured(info, file, at);
     else if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);
@@ -219,7 +235,11 @@ export class Importer {
     const posed = await this.#posed(info, file, way);
     if (!posed) return false;
     const { document, bounds } = posed;
-    if (way === "add") return this.#addScene(document, file, { bounds, warnings });
+    const keep = (offset) => {
+      if (info.animations && !info.variants) this.poses.keep({ id, file, info, offset, shapes: document.shapes });
+    };
+    if (way === "add") return this.#addScene(document, file, { bounds, warnings, keep });
+    keep();
     const whole = bounds && { low: bounds[0], high: bounds[1] };
     if (whole) remember(document.shapes, whole);
     const standing = whole ? await this.#grounded(document, whole) : document;
@@ -231,13 +251,15 @@ export class Importer {
     return true;
   }
 
-  // {document, bounds} of a scene's file, of one that moves or has variants as the person wants it; null where not.
+  // {document, bounds} of a scene's file, of one that has variants as the person wants it; null where not. One that
+  // only moves is at rest, and can be posed in the inspector.
   async #posed({ id, bounds, ...info }, file, way) {
-    if (!info.variants && !info.animations) return { document: await fetchAssetScene(id), bounds };
-    this.messages.hide("upload"); // it is here
+    if (!info.variants) return { document: named(await fetchAssetScene(id), file), bounds };
     const { askPose } = await import("./model-pose.js");
     const pose = await askPose(this.schema, file, { id, ...info }, way === "add" ? "Add" : "Open");
-    return pose && fetchPosedScene(id, pose);
+    if (!pose) return null;
+    const posed = await fetchPosedScene(id, pose);
+    return { ...posed, document: named(posed.document, file) };
   }
 
   // On a ground, where the model brings none.
@@ -247,8 +269,8 @@ export class Importer {
   }
 
   // What a file says of its lights and cameras does not matter where these stay behind.
-  async #addScene(document, file, { bounds, warnings = [] } = {}) {
-    await this.adder.addScene(document, bounds ? { low: bounds[0], high: bounds[1] } : null);
+  async #addScene(document, file, { bounds, warnings = [], keep = () => {} } = {}) {
+    keep(await this.adder.addScene(document, bounds ? { low: bounds[0], high: bounds[1] } : null));
     const left = document.lights?.length ?? 0;
     const told = left
       ? [
@@ -278,19 +300,27 @@ export class Importer {
     measure(id, bounds);
     const isOpened = way === "open";
     const whole = { low: bounds[0], high: bounds[1] };
-    if (isOpened) this.acts.openScene(await this.#grounded(await this.#alone(id, stem(file)), whole), stem(file));
-    else await this.adder.addMesh(id, stem(file));
-    this.#tell(file, warnings, "taken as it is.");
-    return isOpened;
+    const names = { title: titleOf(file), name: stem(file) };
+    if (isOpened) {
+      this.acts.openScene(await this.#grounded(await this.#alone(id, names), whole), names.name);
+      this.#tell(file, warnings, "taken as it is.");
+      return true;
+    }
+    const factor = await this.adder.addMesh(id, names);
+    const size = factor < 1 ? `1/${count(Math.round(1 / factor))}` : `${count(factor)} times`;
+    const scaled = `It is shown at ${size} of its size, as its file does not say a unit. Scale is in the inspector.`;
+    if (factor === 1) this.#tell(file, warnings, "taken as it is.");
+    else this.#tell(file, [scaled, ...warnings], "good to know.");
+    return false;
   }
 
   // A scene of one mesh alone, as the server frames and lights it, of a material that is named like the file.
-  async #alone(id, material) {
+  async #alone(id, { title, name }) {
     const document = await fetchAssetScene(id);
     return {
       ...document,
-      materials: { [material]: this.acts.plainMaterial },
-      shapes: document.shapes.map((shape) => ({ ...shape, material })),
+      materials: { [name]: this.acts.plainMaterial },
+      shapes: document.shapes.map((shape) => ({ ...shape, name: title, material: name })),
     };
   }
 

@@ -3,6 +3,7 @@
 
 import { materialModels, blackMaterial } from "./server/schema.js";
 import { namesOf } from "./document/page-state.js";
+import { isUncharted } from "./document/textures.js";
 import { OnDemand, useSheet } from "./lib/on-demand.js";
 
 // `titleOf(chosen)` is the scene's name in words; `push()` tells the streams what is wanted.
@@ -79,7 +80,8 @@ export function laterParts({
     () => import("./importer.js"),
     async ({ Importer }) => {
       const [beside, thumbnails, { reopen }] = await Promise.all([adder.get(), textures.get(), recipes.get()]);
-      return new Importer({ schema, acts: editor, adder: beside, messages, controller, reopen, thumbnails });
+      const formats = () => page.info?.formats ?? {};
+      return new Importer({ schema, acts: editor, adder: beside, messages, controller, reopen, thumbnails, formats });
     },
     { complain },
   );
@@ -171,6 +173,13 @@ export function laterParts({
   return {
     comparison,
     textures,
+    // Calls `refuse()`, unless what was refused is an image on a thing without texture coordinates: it lies by box then.
+    mend(problem, refuse) {
+      if (!isUncharted(problem)) return refuse();
+      return import("./document/by-box.js")
+        .then(({ lieByBox }) => lieByBox({ acts: editor, messages, problem, refuse }))
+        .catch(refuse);
+    },
     adder,
     importer,
     menus,

@@ -159,15 +159,7 @@ const stream = new Stream({
     tellState();
     say("The picture is done");
   },
-  refused(problem, valid) {
-    const places = editor.takeBack(problem, valid && { ...valid, scene: entire(valid.scene) }, (pointer, detail) =>
-      panel.mark(pointer, sentence(detailWords(detail))),
-    );
-    // Said once: at the control, where that can be seen.
-    preparing.end();
-    if (!places.length || places.includes(null) || !panel.isMarkSeen) complain(problem);
-    else say(problemText(problem, titles));
-  },
+  refused: (problem, valid) => later.mend(problem, () => takeBack(problem, valid)),
   lost({ title, detail = "", key }, wait_ms) {
     page.isConnected = false;
     preparing.end();
@@ -184,6 +176,16 @@ const stream = new Stream({
     });
   },
 });
+
+function takeBack(problem, valid) {
+  const places = editor.takeBack(problem, valid && { ...valid, scene: entire(valid.scene) }, (pointer, detail) =>
+    panel.mark(pointer, sentence(detailWords(detail))),
+  );
+  // Said once: at the control, where that can be seen.
+  preparing.end();
+  if (!places.length || places.includes(null) || !panel.isMarkSeen) complain(problem);
+  else say(problemText(problem, titles));
+}
 
 const preparing = new Preparing({
   label: find("preparing"),
@@ -228,6 +230,7 @@ const panel = new Panel(find, {
   stage: {
     frame: (thing) => controller.frame(thing),
     duplicate: adder.calls("duplicate"),
+    poses: () => importer.now?.poses,
     takeTexture: importer.calls("texture"),
     replaceFile: importer.calls("replace"),
     takeTable: importer.calls("table"),

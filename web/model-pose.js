@@ -74,7 +74,7 @@ export async function askPose(schema, file, { id, variants = [], animations = []
     title: `How is ${file.name} taken?`,
     yes: action,
     body: [
-      picture,
+      element("div", { class: "pose-stage" }, picture, element("p", { class: "dim" }, "Its picture is on the way…")),
       trouble,
       variants.length ? variant.row : null,
       ...(animations.length ? [animation.row, timing] : []),

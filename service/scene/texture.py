@@ -75,8 +75,9 @@ class ImageTexture(Model):
     ] = 0.0
     offset: Annotated[Pair, hint("Offset", "Added to u and v last.", unit="", widget="number")] = (0.0, 0.0)
     uv: Annotated[
-        int, Field(ge=0, le=1), hint("UV set", "Of a mesh's two sets of coordinates.", unit="", widget="number")
-    ] = 0
+        int, Field(ge=0, le=1),
+        hint("UV set", "Of a mesh's two sets of coordinates.", unit="", widget="number", used=("mapping", ["uv"])),
+    ] = 0  # fmt: skip
 
     @model_validator(mode="after")
     def _reads_what_it_names(self) -> Self:

@@ -58,7 +58,7 @@ def _number(scene: Scene) -> int:
 
 def _asked(scene: Scene) -> list[object]:
     """The demands on textures and meshes that these could turn out not to meet."""
-    sets = [[getattr(t, name, None) for name in ("uv", "space", "input")] for t in scene.textures.values()]
+    sets = [[getattr(t, name, None) for name in ("uv", "mapping", "space", "input")] for t in scene.textures.values()]
     cut = [(shape.max_edge, shape.transform) for shape in _displaced(scene)]
     return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes], cut]
 

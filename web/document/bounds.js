@@ -47,6 +47,21 @@ const measured = new Map(); // the corners of uploaded meshes, by asset
 // `bounds`: least and greatest coordinates, as the server answers an upload.
 export const measure = (asset, [low, high]) => measured.set(asset, corners(low, high));
 
+const asked = new Map(); // the answers about meshes that were not uploaded here, by asset
+
+// Has the boxes of these shapes' meshes known, as `describe(asset)` promises {bounds}; of some there are none.
+export function learn(shapes, describe) {
+  const files = shapes.map(({ asset }) => asset).filter((asset) => asset && !measured.has(asset) && !asked.has(asset));
+  for (const asset of new Set(files)) {
+    const answer = describe(asset).then(
+      ({ bounds }) => bounds && measure(asset, bounds),
+      () => asked.delete(asset), // no connection: the next one who wants to know asks again
+    );
+    asked.set(asset, answer);
+  }
+  return Promise.all(shapes.map(({ asset }) => asked.get(asset)));
+}
+
 // Where a sphere's box touches it, also where its transform makes an ellipsoid of it.
 function touches({ center, radius, transform }) {
   const origin = place([0, 0, 0], transform);
@@ -164,4 +179,19 @@ export function together(balls) {
     center,
     radius: balls.reduce((most, each) => Math.max(most, length(subtract(each.center, center)) + each.radius), 0),
   };
+}
+
+// {low, high} of a file's mesh before its transform, or null.
+export function meshBox({ asset }) {
+  const cloud = measured.get(asset) ?? seen.get(asset);
+  return cloud ? boxAround(cloud) : null;
+}
+
+// The longest side of a shape before its transform, in metres, or null where neither the document nor its file tells.
+export function ownExtent(shape) {
+  if (shape.type === "sphere") return 2 * shape.radius;
+  const cloud = points(shape);
+  if (!cloud?.length) return null;
+  const { low, high } = boxAround(cloud);
+  return Math.max(...subtract(high, low));
 }

@@ -39,9 +39,9 @@ const dressed = (shapes, from, to) =>
   shapes.map((shape) => (shape.material === from ? { ...shape, material: to } : shape));
 
 export function renamed({ scene, chosen, compare }, from, to) {
-  const { [from]: document, ...others } = scene.materials;
+  const materials = Object.entries(scene.materials).map(([name, each]) => [name === from ? to : name, each]);
   return {
-    scene: { ...scene, materials: { ...others, [to]: document }, shapes: dressed(scene.shapes, from, to) },
+    scene: { ...scene, materials: Object.fromEntries(materials), shapes: dressed(scene.shapes, from, to) },
     chosen: { ...chosen, material: chosen.material === from ? to : chosen.material },
     compare: compare?.material === from ? { ...compare, material: to } : compare,
   };

@@ -43,3 +43,11 @@ export const users = ({ materials, textures = {} }, name) =>
   [...Object.values(materials), ...Object.values(textures)]
     .flatMap(Object.values)
     .filter((value) => isObject(value) && value.texture === name).length;
+
+// Whether all that was refused are textures on things that have no texture coordinates.
+export const isUncharted = ({ errors = [] }) =>
+  errors.length > 0 &&
+  errors.every(
+    ({ pointer, detail }) =>
+      /^\/scene\/shapes\/\d+\/(asset|uvs|material)$/.test(pointer) && detail.includes("mapping 'box'"),
+  );

@@ -78,7 +78,13 @@ export class TextureForm {
   #part(model, place) {
     const own = fields(this.schema, model).filter(({ name }) => name !== "input");
     const form = schemaForm(own, {
-      change: (name, value) => this.acts.edit(`${place}/${name}`, value),
+      change: (name, value) => {
+        const { uv, ...lying } = at(this.acts.state, place) ?? {};
+        // Only texture coordinates come in sets.
+        const isProjected = name === "mapping" && (value ?? "uv") !== "uv" && uv !== undefined;
+        if (isProjected) this.acts.edit(place, { ...lying, mapping: value }, `${place}/mapping`);
+        else this.acts.edit(`${place}/${name}`, value);
+      },
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
     });

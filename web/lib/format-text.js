@@ -18,6 +18,7 @@ const NAMES = {
   cook_torrance: "Cook\u2013Torrance",
   schlick_ggx: "Schlick\u2013GGX",
   color: "Colour",
+  uv: "UV",
   shape_id: "Shapes",
   material_id: "Materials",
 };

@@ -166,6 +166,7 @@ export class ThingPart {
     this.#find("thing-acts").replaceChildren(
       ...[
         isShape ? button("Frame", () => this.stage.frame(thing)) : null,
+        isShape && this.stage.poses()?.has(document) ? button("Pose…", () => this.#pose(thing)) : null,
         /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.stage.duplicate(thing)) : null,
         removable ? button("Delete", () => this.acts.remove(thing)) : null,
       ].filter(Boolean),
@@ -179,6 +180,10 @@ export class ThingPart {
     );
     const rotation = this.#find("thing-form").querySelector("[data-field=rotation] input[type=range]");
     rotation?.setAttribute("aria-label", "Environment rotation");
+  }
+
+  #pose(thing) {
+    return this.stage.poses().ask(Number(thing.split("/")[2]));
   }
 
   // Imported parts stand by a matrix: the form shows it as a move, a turn and a scale, which an edit makes of it.

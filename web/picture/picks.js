@@ -1,14 +1,17 @@
 // What a click in the picture is about, and what the camera is brought to: selecting, focusing, framing.
 
-import { ball, box, isFlat, together } from "../document/bounds.js";
-import { axes, ray } from "../document/camera.js";
+import { ball, box, isFlat, learn, together } from "../document/bounds.js";
+import { axes, eye, ray } from "../document/camera.js";
 import { isOn } from "../document/outline.js";
 import { Picker } from "../document/picking.js";
 import { inWords } from "../lib/format-text.js";
 import { at, equal, pointer } from "../lib/patch.js";
+import { describeAsset } from "../server/api.js";
+import { behind, isThere } from "../document/through.js";
 import { dot } from "../lib/vector.js";
 
 const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
+const DOUBLE_MS = 400; // after a click in which another one is a part of it, and does not go on to what is behind
 const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
 
 // Whether shapes are those that there were, be they of another material.
@@ -20,6 +23,7 @@ const areInPlace = (shapes, before = []) =>
 export class Picks {
   #outlined = {}; // what the outline was drawn of: it stays while that is so
   #before = null; // the same, while a hand points at shapes
+  #clicked = null; // where the last click was, what there was then, and the thing that it took
 
   // `find(id)` elements, `acts` the editor, `stream`, `viewport`; `say(text)`, `complain(error)`.
   constructor({ find, acts, stream, viewport, say, complain }) {
@@ -48,15 +52,43 @@ export class Picks {
 
   async select(place) {
     const { scene } = this.acts.state;
+    const before = this.#clicked; // now: a click that has not been answered yet is not gone through
     const shape = await this.picker.shape(scene, place);
     if (shape === null || !scene.shapes[shape]) {
       this.acts.select("/environment");
       return this.say("Environment selected");
     }
-    if (isOn(this.acts.state, "locked", [pointer("shapes", shape)])) return this.say("It is locked");
-    this.acts.select(pointer("shapes", shape));
-    this.say(`${inWords(scene.shapes[shape].material)} selected`);
-    await this.#outline(scene, shape);
+    const isAgain = before && this.#isAgain(before, place, scene);
+    const chosen = isAgain ? await this.#behind(place, scene, shape, Number(before.thing.split("/")[2])) : shape;
+    if (isOn(this.acts.state, "locked", [pointer("shapes", chosen)])) return this.say("It is locked");
+    this.acts.select(pointer("shapes", chosen));
+    const { camera, shapes } = scene;
+    this.#clicked = { place, camera, shapes, thing: pointer("shapes", chosen), when: performance.now() };
+    this.say(`${inWords(scene.shapes[chosen].material)} selected`);
+    if (chosen === shape) await this.#outline(scene, shape);
+    else this.find("outline").classList.remove("shown"); // what lies behind has no edge in the picture
+  }
+
+  // Whether a click is at the same place as the one before, of which the selection is.
+  #isAgain({ place: last, camera, shapes, thing, when }, place, scene) {
+    const { width, height } = this.viewport.canvas;
+    return (
+      performance.now() - when > DOUBLE_MS &&
+      isThere(last, place, width / height) &&
+      camera === scene.camera &&
+      shapes === scene.shapes &&
+      thing === this.acts.state.chosen.thing
+    );
+  }
+
+  // What lies behind the shape `last`, where `seen` is what the picture shows.
+  async #behind(place, scene, seen, last) {
+    await this.boxes(); // so that meshes have some
+    const { camera } = this.acts;
+    const { width, height } = this.viewport.canvas;
+    const [from, way] = [eye, ray].map((part) => part(camera, place.x, place.y, width / height));
+    const isLocked = (i) => isOn(this.acts.state, "locked", [pointer("shapes", i)]);
+    return behind(scene.shapes, from, way, seen, last, isLocked);
   }
 
   async #outline(scene, shape) {
@@ -97,9 +129,10 @@ export class Picks {
     this.say(`Focus at ${along.toPrecision(3)} metres${lens.aperture_radius ? ", aperture opened" : ""}`);
   }
 
-  // The box around each shape of the scene: what the document tells, else what is seen of it, else null.
+  // The box around each shape of the scene: what the document or its file tells, else what is seen of it, else null.
   async boxes() {
     const { scene } = this.acts.state;
+    await Promise.race([learn(scene.shapes, describeAsset), new Promise((resolve) => setTimeout(resolve, BRIEF_MS))]);
     const known = scene.shapes.map(box);
     if (known.every(Boolean)) return known;
     const seen = await this.picker.boxes(scene, this.acts.camera, BRIEF_MS).catch(() => new Map());

@@ -56,6 +56,8 @@ export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
 // As JSON it would be what the asset is.
 export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`, { headers: { accept: "*/*" } })).blob();
+// What an asset is: {kind, bounds, triangles, ...}.
+export const describeAsset = (id) => get(`assets/${id}`);
 export const fetchAssetMaterials = (id) => get(`assets/${id}/materials`);
 export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 
