@@ -256,7 +256,7 @@ export class Importer {
   async #posed({ id, bounds, ...info }, file, way) {
     if (!info.variants) return { document: named(await fetchAssetScene(id), file), bounds };
     const { askPose } = await import("./model-pose.js");
-    const pose = await askPose(this.schema, file, { id, ...info }, way === "add" ? "Add" : "Open");
+    const pose = await askPose(this.schema, file, { id, ...info }, { action: way === "add" ? "Add" : "Open" });
     if (!pose) return null;
     const posed = await fetchPosedScene(id, pose);
     return { ...posed, document: named(posed.document, file) };

@@ -34,8 +34,13 @@ function simple(scene, schema) {
 }
 
 // The pose that the person takes, {} for the model as it was saved; null where they think better of it. `schema` is that of
-// scenes, `info` what the server says of the file, `action` what the button does.
-export async function askPose(schema, file, { id, variants = [], animations = [] }, action) {
+// scenes, `info` what the server says of the file, `action` what the button does under the `title`.
+export async function askPose(
+  schema,
+  file,
+  { id, variants = [], animations = [] },
+  { action, title = `How is ${file.name} taken?` },
+) {
   const own = freshId("pose");
   const variant = menu(`${own}-variant`, "Variant", "As it was saved", variants);
   const animation = menu(
@@ -71,7 +76,7 @@ export async function askPose(schema, file, { id, variants = [], animations = []
   });
   changed();
   const taken = await confirm({
-    title: `How is ${file.name} taken?`,
+    title,
     yes: action,
     body: [
       element("div", { class: "pose-stage" }, picture, element("p", { class: "dim" }, "Its picture is on the way…")),

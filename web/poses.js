@@ -52,7 +52,8 @@ export class Poses {
     const model = this.#modelOf(this.acts.state.scene.shapes[index] ?? {});
     if (!model) return;
     const { id, file, info, offset } = model;
-    const pose = await askPose(this.schema, file, { id, animations: info.animations }, "Pose");
+    const asked = { action: "Pose", title: `Pose of ${file.name}` };
+    const pose = await askPose(this.schema, file, { id, animations: info.animations }, asked);
     if (!pose) return;
     try {
       const { document } = await fetchPosedScene(id, pose);

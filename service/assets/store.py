@@ -245,7 +245,15 @@ class AssetStore:
         if self._is_sound(id):
             return id
         if part.triangles is not None:
-            info = AssetInfo(id, "mesh", "ply", len(part.data), vertices=part.vertices, triangles=part.triangles)
+            info = AssetInfo(
+                id,
+                "mesh",
+                "ply",
+                len(part.data),
+                vertices=part.vertices,
+                triangles=part.triangles,
+                bounds=part.bounds,
+            )
         else:
             format = format_of(part.data)
             if format is None:

@@ -131,6 +131,7 @@ class ScenePart:
     pointer: str  # where it came from
     vertices: int | None = None
     triangles: int | None = None
+    bounds: list[list[float]] | None = None  # of a mesh: least and greatest x, y, z, m
 
 
 @dataclass(frozen=True)

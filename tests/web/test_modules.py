@@ -303,26 +303,6 @@ def test_colours_are_three_numbers_however_parted(page: Page, text: str) -> None
     assert call(page, "lib/number.js", "parseTriple", text) == [0.2, 0.4, 0.6]
 
 
-def test_a_new_thing_finds_a_place_beside_the_others(page: Page) -> None:
-    ball, crate = {"low": [-1, 0, -1], "high": [1, 2, 1]}, {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
-    new = {"low": [-0.4, 0.5, -0.4], "high": [0.4, 1.3, 0.4]}
-    assert call(page, "document/placing.js", "wayOut", new, [crate], [1, 0, 0]) is None, "it is in nobody's way"
-    for right in ([1, 0, 0], [-1, 0, 0], [0.6, 0, 0.8], [0.6, 0.5, 0.6]):
-        found = call(page, "document/placing.js", "wayOut", new, [ball, crate], right, {"stands": True})
-        low, high = (np.add(new[end], found["offset"]) for end in ("low", "high"))
-        assert low[1] == pytest.approx(0), "on the ground of the ball"
-        for other in (ball, crate):
-            assert not all(low[k] < other["high"][k] and other["low"][k] < high[k] for k in range(3)), right
-    assert found["neighbour"] == ball
-    assert call(page, "document/placing.js", "wayOut", new, [ball], [1, 0, 0])["offset"] == [1.48, 0, 0]
-
-
-def test_floors_and_rooms_are_in_nobodys_way(page: Page) -> None:
-    room, floor = {"low": [-9, 0, -9], "high": [9, 5, 9]}, {"low": [-5, -0.1, -5], "high": [5, 0, 5]}
-    crate = {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
-    assert call(page, "document/placing.js", "solids", [room, None, floor, crate], [0, 1, 8]) == [crate]
-
-
 def test_a_scene_is_added_under_free_names(page: Page) -> None:
     paint = {"type": "diffuse", "albedo": {"texture": "wood", "factor": 0.5}}
     scene = {"materials": {"paint": {"type": "diffuse"}}, "textures": {"wood": {"asset": "a"}}, "shapes": []}

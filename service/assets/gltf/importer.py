@@ -153,7 +153,7 @@ class _Importer:
                 raise _wrong(primitive, place, name, rows, bad[0], "is not finite")
         charts = [None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]]) for uv in primitive.uvs]
         data = ply(vertices, primitive.faces, primitive.normals, charts, primitive.colors, primitive.tangents)
-        reference = self.files.add(data, place.pointer, len(vertices), len(primitive.faces))
+        reference = self.files.add_mesh(data, place.pointer, vertices, len(primitive.faces))
         self._triangles += 0 if reference in self._held else len(primitive.faces)
         self._held.add(reference)
         limit = self.file.limits.max_triangles

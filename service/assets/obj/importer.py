@@ -147,5 +147,5 @@ def _keep(files: PartFiles, mesh: RawMesh, which: Longs, pointer: str) -> dict[s
     if groups is not None and groups.min() == groups.max():
         groups = None
     data = ply(mesh.vertices[used], triangles, normals, [uvs], colors, groups=groups)
-    shape = {"type": "mesh", "asset": files.add(data, pointer, len(used), len(triangles))}
+    shape = {"type": "mesh", "asset": files.add_mesh(data, pointer, mesh.vertices[used], len(triangles))}
     return shape | ({"smooth": False} if is_flat else {})

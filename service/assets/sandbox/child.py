@@ -121,7 +121,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
 
 def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, SceneFile):
-        parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
+        parts = [(len(p.data), p.pointer, p.vertices, p.triangles, p.bounds) for p in parsed.parts]
         animations = [vars(one) for one in parsed.animations]
         text = json.dumps(vars(parsed) | {"parts": parts, "animations": animations}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]

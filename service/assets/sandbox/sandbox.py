@@ -269,8 +269,8 @@ def _oddities(found: dict[str, Any]) -> MeshOddities:
 
 def _scene(text: Array, files: Array) -> SceneFile:
     facts, view, parts, at = json.loads(text.tobytes()), files.data, [], 0
-    for size, pointer, vertices, triangles in facts["parts"]:
-        parts.append(ScenePart(view[at : at + size], str(pointer), vertices, triangles))
+    for size, pointer, vertices, triangles, bounds in facts["parts"]:
+        parts.append(ScenePart(view[at : at + size], str(pointer), vertices, triangles, bounds))
         at += size
     return SceneFile(
         facts["document"], parts, facts["warnings"], int(facts["triangles"]), bool(facts["lit"]), facts["exposure"],

@@ -212,7 +212,7 @@ class _Importer:
         if len(bad):
             raise ParseError(f"a point is not finite or lies beyond 1e9: {piece.vertices[bad[0]].tolist()}", pointer)
         data = ply(piece.vertices, piece.faces, piece.normals, piece.uvs, piece.colors)
-        return self.files.add(data, pointer, len(piece.vertices), len(piece.faces))
+        return self.files.add_mesh(data, pointer, piece.vertices, len(piece.faces))
 
     def _count(self, triangles: int) -> None:
         self._triangles += triangles
