@@ -32,11 +32,12 @@ const titleOf = (file) =>
     .replaceAll("/", "-")
     .slice(0, 80) || "Model";
 
-// A scene whose things have names: those that have none in the file are called as the file is.
-const named = (document, file) => ({
-  ...document,
-  shapes: document.shapes.map((shape) => (shape.name ? shape : { ...shape, name: titleOf(file) })),
-});
+// A scene whose things have names: those that have none in the file are called as the file is, "duck", "duck 2".
+function named(document, file) {
+  let count = 0;
+  const next = () => ((count += 1) > 1 ? `${titleOf(file)} ${count}` : titleOf(file));
+  return { ...document, shapes: document.shapes.map((shape) => (shape.name ? shape : { ...shape, name: next() })) };
+}
 
 const stem = (file) =>
   file.name

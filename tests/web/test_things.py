@@ -25,7 +25,7 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
     editor.page.click("dialog[open] [value=open]")
     editor.tab("scene")
     things = editor.page.locator("#outline-list [data-thing^='/shapes/']")
-    editor.wait("the parts", lambda: "Mesh 2" in editor.text("#outline-list"))
+    editor.wait("the parts", lambda: "two 2" in editor.text("#outline-list"))
 
     things.nth(0).click()
     assert entries(editor, "translate") == [0.5, 1, 0]
