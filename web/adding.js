@@ -21,6 +21,15 @@ function beamAround(radius, distance) {
   return { inner_angle: Number(angle.toPrecision(2)), outer_angle: Number((1.4 * angle).toPrecision(2)) };
 }
 
+// A name like one that there is, with a number that is free: "Wheel 2".
+function another(name, all) {
+  const [stem] = name.split(/ \d+$/);
+  const taken = new Set(all.map((each) => each.name));
+  let i = 2;
+  while (taken.has(`${stem} ${i}`)) i += 1;
+  return `${stem} ${i}`;
+}
+
 // The box around a scene: by its shapes, else by what its camera has in view.
 function sizeOf({ shapes }, camera) {
   const known = shapes.filter((shape) => !isFlat(shape)).map(box);
@@ -83,15 +92,17 @@ export class Adder {
 
   async duplicate(thing) {
     const [, kind] = thing.split("/");
-    const original = at(this.acts.state.scene, thing);
-    if (kind === "lights") return this.acts.add(kind, this.#apart(original));
+    const { scene } = this.acts.state;
+    const original = at(scene, thing);
+    const copy = original.name ? { ...original, name: another(original.name, scene[kind]) } : original;
+    if (kind === "lights") return this.acts.add(kind, this.#apart(copy));
     const own = (await this.controller.boxes())[Number(thing.split("/")[2])];
-    if (own && solids([own], this.acts.camera.position).length) return this.#put([original], { around: own });
+    if (own && solids([own], this.acts.camera.position).length) return this.#put([copy], { own, around: await this.#surroundings() });
     // A floor or a wall comes in front of itself; what can't be measured goes aside.
     const away = isFlat(original)
       ? normalize(original.normal ?? cross(original.u, original.v))
       : axes(this.acts.camera).right;
-    return this.acts.add(kind, moved(original, scale(away, this.controller.radius())));
+    return this.acts.add(kind, moved(copy, scale(away, this.controller.radius())));
   }
 
   // A light that is not where another one is.

@@ -5,13 +5,12 @@
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";
 import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
-import { accepted, browse, checkFile, kindOf } from "./lib/files.js";
+import { accepted, browse, kindOf } from "./lib/files.js";
 import { isUnderNoSky, studio } from "./document/lighting.js";
 import { unpacked } from "./document/material-set.js";
 import { pointer } from "./lib/patch.js";
 import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
 import { readRecipe } from "./document/recipe.js";
-import { Poses } from "./poses.js";
 import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
 import { pictured } from "./document/textures.js";
@@ -51,7 +50,7 @@ export class Importer {
   // the server says of files.
   constructor({ schema, acts, adder, messages, controller, reopen, thumbnails, formats }) {
     Object.assign(this, { schema: schema.scene, acts, adder, messages, controller, reopen, thumbnails, formats });
-    this.poses = new Poses({ schema: schema.scene, acts, refuse: (file, problem) => this.#refuse(file, problem) });
+    this.poses = null; // of models that move, where one has come in
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
@@ -116,6 +115,7 @@ export class Importer {
       this.reopen(recipe, stem(file));
       return true;
     }
+    const { checkFile } = await import("./lib/check-file.js");
     await checkFile(file, this.formats());
     const info = await this.upload(file); // before anything is asked: a broken file is no whole scene
     if (info.kind === "materials") return this.#takeMaterials(info, file, at);
@@ -236,9 +236,8 @@ export class Importer {
     const posed = await this.#posed(info, file, way);
     if (!posed) return false;
     const { document, bounds } = posed;
-    const keep = (offset) => {
-      if (info.animations && !info.variants) this.poses.keep({ id, file, info, offset, shapes: document.shapes });
-    };
+    const moves = info.animations && !info.variants ? await this.#poses() : null;
+    const keep = (offset) => moves?.keep({ id, file, info, offset, shapes: document.shapes });
     if (way === "add") return this.#addScene(document, file, { bounds, warnings, keep });
     keep();
     const whole = bounds && { low: bounds[0], high: bounds[1] };
@@ -250,6 +249,13 @@ export class Importer {
     const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", isUnderNoSky(document) ? studioToo : null);
     return true;
+  }
+
+  async #poses() {
+    const { Poses } = await import("./poses.js");
+    const { schema, acts } = this;
+    this.poses ??= new Poses({ schema, acts, refuse: (file, problem) => this.#refuse(file, problem) });
+    return this.poses;
   }
 
   // {document, bounds} of a scene's file, of one that has variants as the person wants it; null where not. One that
@@ -308,8 +314,8 @@ export class Importer {
       return true;
     }
     const factor = await this.adder.addMesh(id, names);
-    const size = factor < 1 ? `1/${count(Math.round(1 / factor))}` : `${count(factor)} times`;
-    const scaled = `It is shown at ${size} of its size, as its file does not say a unit. Scale is in the inspector.`;
+    const size = factor < 1 ? `1/${count(Math.round(1 / factor))} of` : `${count(factor)} times`;
+    const scaled = `It is shown at ${size} its size, as its file does not say a unit. Scale is in the inspector.`;
     if (factor === 1) this.#tell(file, warnings, "taken as it is.");
     else this.#tell(file, [scaled, ...warnings], "good to know.");
     return false;

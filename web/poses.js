@@ -1,6 +1,5 @@
 // Models that move: they come in at rest, and stand in another pose when somebody asks for it in the inspector.
 
-import { askPose } from "./model-pose.js";
 import { moved } from "./document/transforms.js";
 import { equal, pointer } from "./lib/patch.js";
 import { fetchPosedScene } from "./server/api.js";
@@ -53,6 +52,7 @@ export class Poses {
     if (!model) return;
     const { id, file, info, offset } = model;
     const asked = { action: "Pose", title: `Pose of ${file.name}` };
+    const { askPose } = await import("./model-pose.js");
     const pose = await askPose(this.schema, file, { id, animations: info.animations }, asked);
     if (!pose) return;
     try {

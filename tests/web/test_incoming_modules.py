@@ -63,7 +63,7 @@ def test_floors_and_rooms_are_in_nobodys_way(page: Page) -> None:
 
 
 def test_a_model_without_a_unit_is_as_large_as_its_neighbours(page: Page) -> None:
-    for radius, factor in [(1.5, 1), (0.4, 1), (900, 0.001), (0.012, 100), (35, 0.1), (0, 1)]:
+    for radius, factor in [(1.5, 1), (0.2, 1), (900, 0.001), (0.012, 100), (35, 0.1), (0, 1)]:
         assert call(page, PLACING, "sized", {"radius": radius}, 1.2) == factor
 
 
@@ -76,7 +76,7 @@ def test_renaming_a_material_keeps_its_place(page: Page) -> None:
 # --- files ---
 
 CHECK = """async ([name, bytes, formats]) => {
-    const { checkFile } = await import(new URL("lib/files.js", location));
+    const { checkFile } = await import(new URL("lib/check-file.js", location));
     await checkFile(new File([Uint8Array.from(bytes)], name), formats);
 }"""
 WHOLE = b"glTF" + struct.pack("<II", 2, 12)
@@ -174,7 +174,7 @@ def test_a_further_click_takes_what_is_behind(page: Page) -> None:
 
 @pytest.mark.parametrize("x", [0.5, 0.503, 0.52])
 def test_a_hand_is_not_quite_still(page: Page, x: float) -> None:
-    there = call(page, "document/through.js", "isThere", {"x": 0.5, "y": 0.5}, {"x": x, "y": 0.5}, 1.5)
+    there = call(page, "document/picking.js", "isThere", {"x": 0.5, "y": 0.5}, {"x": x, "y": 0.5}, 1.5)
     assert there is (x < 0.51)
 
 

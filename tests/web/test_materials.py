@@ -16,14 +16,14 @@ def test_what_is_new_shares_no_material(editor: Editor) -> None:
     page.click("#library [data-value=copper]")
     editor.wait("copper", lambda: page.get_attribute("#library [data-value=copper]", "aria-selected") == "true")
     editor.drop("#stage", {"wing.obj": TRIANGLE})
-    editor.wait("the mesh", lambda: editor.text(users) == "Mesh is made of it.")
+    editor.wait("the mesh", lambda: editor.text(users) == "Wing is made of it.")
     page.click("#library [data-value=chalk]")
 
     page.click("#thing-acts >> text=Duplicate")
     editor.tab("material")
-    assert editor.text(users) == "Mesh and Mesh 2 are made of it.", "sharing is told"
+    assert editor.text(users) == "Wing and wing 2 are made of it.", "sharing is told"
     editor.act("own-material")
-    assert editor.text(users) == "Mesh 2 is made of it." and page.is_hidden("#own-material")
+    assert editor.text(users) == "Wing 2 is made of it." and page.is_hidden("#own-material")
     page.click("#new-material")
     scene = document(editor)
     assert [shape["material"] for shape in scene["shapes"]] == ["subject", "floor", "sphere", "wing", "material"]

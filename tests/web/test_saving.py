@@ -16,7 +16,7 @@ from PIL import Image
 from service.images import read_metadata
 from tests.serving import Server
 from tests.web.conftest import WINDOW
-from tests.web.editing import TRIANGLE, finish, overlay
+from tests.web.editing import TRIANGLE, document, finish, overlay
 from tests.web.editor import Editor
 
 
@@ -241,7 +241,7 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     things = editor.page.locator("#outline-list [role=treeitem]")
     editor.drop("#stage", {"triangle.obj": TRIANGLE})
     editor.tab("scene")
-    editor.wait("the mesh", lambda: things.count() == 5 and editor.text("#thing-title") == "Mesh")
+    editor.wait("the mesh", lambda: things.count() == 5 and editor.text("#thing-title") == "triangle")
     editor.settled()
     editor.page.evaluate("document.activeElement.blur()")
     editor.page.keyboard.press("Delete")
@@ -263,8 +263,8 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
     editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
-    editor.page.click("dialog[open] [value=open]")
     editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))
+    assert editor.page.locator("dialog[open]").count() == 0, "nothing is asked about what cannot be read"
 
 
 def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
@@ -273,11 +273,19 @@ def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     tiny = b"v -.02 .98 0\nv .02 .98 0\nv 0 1.02 0\nv 0 1 .03\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 2 9\n"
     editor.drop("#stage", {"tiny.obj": tiny})
     editor.tab("scene")
-    editor.wait("the mesh", lambda: editor.text("#thing-title") == "Mesh")
-    assert "tiny.obj: taken as it is. 1 face" in " ".join(editor.text("#messages").split())
+    editor.wait("the mesh", lambda: editor.text("#thing-title") == "tiny")
+    told = " ".join(editor.text("#messages").split())
+    assert "tiny.obj: good to know." in told and "10 times its size" in told and "1 face" in told
+    shape = document(editor)["shapes"][-1]
+    assert shape["transform"]["scale"] == 10 and shape["transform"]["translate"][1] == pytest.approx(-9.8), (
+        "on the floor"
+    )
     editor.settled()
+    editor.page.click("#thing-acts >> text=Frame")
     editor.page.click("#outline-list [data-thing='/camera']")
-    editor.click_until("what is in the middle", lambda: editor.text("#thing-title") == "Mesh")
+    editor.settled()
+    editor.click_until("what is in the middle", lambda: editor.text("#thing-title") == "tiny")
+    editor.page.keyboard.press("Control+z")
     editor.page.keyboard.press("Control+z")
     editor.wait("all as before", lambda: not editor.differs(before, 6))
 

@@ -6,6 +6,10 @@ import { add, scale } from "../lib/vector.js";
 
 const RAW = { format: "rgba32f", quality: null, bits: 8 };
 const PATIENCE_MS = 3000; // after which a preview tells what is under a hand
+const NEAR = 0.01; // of the picture's height: how far apart two clicks at the same place are at most
+
+// Whether two places in the picture, 0..1, are one for a hand.
+export const isThere = (a, b, aspect) => Math.hypot((a.x - b.x) * aspect, a.y - b.y) < NEAR;
 
 export class Picker {
   #stream;

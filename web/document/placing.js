@@ -91,7 +91,7 @@ export function standing(box, { grounds, bodies, target, right, lost = false }) 
   return { offset, neighbour: way?.neighbour ?? null };
 }
 
-const LIKE = 4; // how many times larger or smaller than its neighbours a thing may be
+const LIKE = 10; // how many times larger or smaller than its neighbours a thing may be
 
 // The power of ten by which a model without a unit is as large as what it comes to, whose radius is `usual`; 1 where
 // it is already.

@@ -3,12 +3,8 @@
 import { boxAround, meshBox, unplace } from "./bounds.js";
 import { add, cross, dot, length, scale, subtract } from "../lib/vector.js";
 
-const NEAR = 0.01; // of the picture's height: how far apart two clicks at the same place are at most
 const MOST_FACES = 20_000; // of a mesh that is tried triangle by triangle; a larger one counts as its box
 const SAME = 1e-4; // of a distance: what lies closer behind another thing touches it
-
-// Whether two places in the picture, 0..1, are one for a hand.
-export const isThere = (a, b, aspect) => Math.hypot((a.x - b.x) * aspect, a.y - b.y) < NEAR;
 
 // The first of some distances that is ahead, or null.
 function first(distances) {

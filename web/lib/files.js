@@ -30,22 +30,6 @@ const KINDS = {
 // What a file is by its ending: scene, mesh, light, image, table, measurement or json; undefined for others.
 export const kindOf = (file) => KINDS[file.name.split(".").at(-1).toLowerCase()];
 
-const GLB = { magic: 0x46546c67, header: 12 }; // "glTF"; then a version, and the length of the file
-
-// Raises what is known to be wrong with a file before it is sent. `formats` is what the server says of them; {} where
-// it has not said it.
-export async function checkFile(file, { missing = {} }) {
-  if (!file.size) throw new Error("The file is empty.");
-  const ending = file.name.split(".").at(-1).toLowerCase();
-  const format = ending.startsWith("usd") ? "usd" : ending;
-  if (missing[format]) throw new Error(`${format.toUpperCase()} files need ${missing[format]} on the server.`);
-  if (ending !== "glb") return;
-  const head = new DataView(await file.slice(0, GLB.header).arrayBuffer());
-  if (head.byteLength < GLB.header || head.getUint32(0, true) !== GLB.magic) throw new Error("It is no GLB file.");
-  const whole = head.getUint32(8, true);
-  if (whole > file.size) throw new Error(`The file is cut off: ${file.size} of its ${whole} bytes are there.`);
-}
-
 // The endings of files of these kinds, as a file picker takes them.
 export const accepted = (kinds) =>
   Object.keys(KINDS)

@@ -3,11 +3,10 @@
 import { ball, box, isFlat, learn, together } from "../document/bounds.js";
 import { axes, eye, ray } from "../document/camera.js";
 import { isOn } from "../document/outline.js";
-import { Picker } from "../document/picking.js";
+import { Picker, isThere } from "../document/picking.js";
 import { inWords } from "../lib/format-text.js";
 import { at, equal, pointer } from "../lib/patch.js";
 import { describeAsset } from "../server/api.js";
-import { behind, isThere } from "../document/through.js";
 import { dot } from "../lib/vector.js";
 
 const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
@@ -76,13 +75,14 @@ export class Picks {
       performance.now() - when > DOUBLE_MS &&
       isThere(last, place, width / height) &&
       camera === scene.camera &&
-      shapes === scene.shapes &&
+      areInPlace(scene.shapes, shapes) &&
       thing === this.acts.state.chosen.thing
     );
   }
 
   // What lies behind the shape `last`, where `seen` is what the picture shows.
   async #behind(place, scene, seen, last) {
+    const { behind } = await import("../document/through.js");
     await this.boxes(); // so that meshes have some
     const { camera } = this.acts;
     const { width, height } = this.viewport.canvas;

@@ -1,0 +1,17 @@
+// What can be known of a file before it is sent.
+
+const GLB = { magic: 0x46546c67, header: 12 }; // "glTF"; then a version, and the length of the file
+
+// Raises what is known to be wrong with a file before it is sent. `formats` is what the server says of them; {} where
+// it has not said it.
+export async function checkFile(file, { missing = {} }) {
+  if (!file.size) throw new Error("The file is empty.");
+  const ending = file.name.split(".").at(-1).toLowerCase();
+  const format = ending.startsWith("usd") ? "usd" : ending;
+  if (missing[format]) throw new Error(`${format.toUpperCase()} files need ${missing[format]} on the server.`);
+  if (ending !== "glb") return;
+  const head = new DataView(await file.slice(0, GLB.header).arrayBuffer());
+  if (head.byteLength < GLB.header || head.getUint32(0, true) !== GLB.magic) throw new Error("It is no GLB file.");
+  const whole = head.getUint32(8, true);
+  if (whole > file.size) throw new Error(`The file is cut off: ${file.size} of its ${whole} bytes are there.`);
+}
