@@ -37,6 +37,7 @@ oren_nayar:"Oren\u2013Nayar",
 cook_torrance:"Cook\u2013Torrance",
 schlick_ggx:"Schlick\u2013GGX",
 color:"Colour",
+uv:"UV",
 shape_id:"Shapes",
 material_id:"Materials",
 };
