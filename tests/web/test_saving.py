@@ -275,9 +275,9 @@ def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     editor.tab("scene")
     editor.wait("the mesh", lambda: editor.text("#thing-title") == "tiny")
     told = " ".join(editor.text("#messages").split())
-    assert "tiny.obj: good to know." in told and "10 times its size" in told and "1 face" in told
+    assert "tiny.obj: good to know." in told and "100 times its size" in told and "1 face" in told
     shape = document(editor)["shapes"][-1]
-    assert shape["transform"]["scale"] == 10 and shape["transform"]["translate"][1] == pytest.approx(-9.8), (
+    assert shape["transform"]["scale"] == 100 and shape["transform"]["translate"][1] == pytest.approx(-98), (
         "on the floor"
     )
     editor.settled()

@@ -727,7 +727,8 @@ class PrincipledMaterial(TypedDict, total=False):
     """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.5, 0.5,
     0.5])"""
     subsurface: float | ScalarTexture
-    """Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger). (0 to 1, default 0.0)"""
+    """Share of the diffuse light that comes out beside where it went in; without a radius a flatter shade. (0 to 1,
+    default 0.0)"""
     metallic: float | ScalarTexture
     """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
     specular: float | ScalarTexture
