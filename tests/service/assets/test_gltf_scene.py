@@ -135,6 +135,9 @@ def test_primitives_of_one_buffer_take_only_their_vertices(store: AssetStore) ->
     file.node(mesh=file.mesh(*halves))
     shapes = imported(store, file).document["shapes"]
     assert [len(store.mesh(shape["asset"]).vertices) for shape in shapes] == [3, 3]
+    for shape in shapes:
+        vertices = store.mesh(shape["asset"]).vertices
+        assert store.info(shape["asset"]).bounds == [vertices.min(0).tolist(), vertices.max(0).tolist()]
     assert np.array_equal(np.concatenate([corners(store, s) for s in shapes]), QUAD[QUAD_FACES.reshape(-1, 3)])
 
 
