@@ -140,6 +140,8 @@ class Editor:
         elif name in MENUS:
             button, menu = MENUS[name]
             if not page.is_visible(menu):
+                if page.is_hidden(button):  # a small window has one button for the tools
+                    page.click("#open-tools")
                 page.click(button)
                 page.wait_for_selector(menu, state="visible")  # its parts come on demand
         elif name == "film":
