@@ -64,6 +64,7 @@ def hint(
     follows: tuple[str, Callable[[float], float]] | None = None,
     ranges: tuple[str, Mapping[Any, tuple[float, float]]] | None = None,
     used: tuple[str, Sequence[str]] | None = None,
+    unless: str | None = None,
     beside: str | None = None,
     example: list[float] | None = None,
     highlight: tuple[Width, str | None] | None = None,
@@ -78,9 +79,9 @@ def hint(
     both its ends; `default`: shown in the schema where the field's own default is None. For a field that may be left
     out: `absent` is a word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then,
     and how. `ranges` names a field with a choice, and the range for each of its values; `used` the choices with which
-    the field has a meaning, and `example` is what it begins with there. `beside` names a field without which it must
-    not stand. `highlight` says in what sense the field is
-    the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
+    the field has a meaning, `unless` the field that takes its place where it is given, and `example` is what it
+    begins with there. `beside` names a field without which it must not stand. `highlight` says in what sense the
+    field is the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
     is what the editor begins an entry of a table with. `known_as` is the name that other models have for the
     parameter. `asset` is the kind of the file that a reference leads to, with the endings of such files' names, where
     the editor lets choose one. `log` is where a slider begins that goes over decades; below it is only 0.
@@ -111,6 +112,8 @@ def hint(
     if used is not None:
         name, values = used
         extra["x-used"] = {"field": name, "values": list(values)}
+    if unless is not None:
+        extra["x-unless"] = unless
     if example is not None:
         extra["examples"] = [example]
     if highlight is not None:

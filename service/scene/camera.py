@@ -22,7 +22,7 @@ class AnyCamera(Model):
     target: Annotated[Point, hint("Target", "The point in the middle of the picture.", unit="m", widget="number")]
     up: Annotated[
         Direction,
-        hint("Up", "The direction that is upward in the picture; any but the view's own.", unit="", widget="number"),
+        hint("Up", "The direction that is upward in the picture.", unit="", widget="number"),
     ] = (0.0, 1.0, 0.0)
 
     @model_validator(mode="after")
@@ -46,7 +46,7 @@ class PerspectiveCamera(AnyCamera):
         Field(gt=0, lt=180),
         hint(
             "Field of view",
-            "Vertical angle; 40 is a short telephoto, 75 a wide angle.",
+            "How much the picture takes in from top to bottom: 40 is a short telephoto, 75 a wide angle.",
             unit="degrees",
             widget="slider",
             soft=(5, 120),
@@ -56,7 +56,7 @@ class PerspectiveCamera(AnyCamera):
         Length,
         hint(
             "Aperture radius",
-            "0 is a pinhole, sharp everywhere; larger blurs what is out of focus.",
+            "0 is sharp everywhere. Larger blurs what is out of focus.",
             unit="m",
             widget="slider",
             soft=0.2,
@@ -67,7 +67,7 @@ class PerspectiveCamera(AnyCamera):
         OMITTABLE,
         hint(
             "Focus distance",
-            "Along the axis to the plane that is sharp; without it, the target's.",
+            "How far away things are sharp. Without it, at the target.",
             unit="m",
             widget="slider",
             soft=20,

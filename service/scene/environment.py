@@ -25,11 +25,19 @@ class _Surroundings(Model):
     ] = 0.0
     scale: Annotated[
         Factor,
-        hint("Brightness", "Factor on the radiance; twice as much is one stop.", unit="", widget="slider", soft=4),
+        hint(
+            "Brightness",
+            "How bright the surroundings are. Twice as much is one stop.",
+            unit="",
+            widget="slider",
+            soft=4,
+        ),
     ] = 1.0
     background: Annotated[
         bool,
-        hint("Show as background", "Off: it lights the scene, but the camera sees black with alpha 0."),
+        hint(
+            "Show as background", "Off: it lights the scene, but the picture is transparent where it would be seen."
+        ),
     ] = True
     medium: Annotated[
         Medium | None, OMITTABLE, hint("Medium", "What fills all space outside of bodies: fog, or the sea.")
@@ -57,7 +65,7 @@ class ConstantEnvironment(_Surroundings):
         Radiance,
         hint(
             "Radiance",
-            "The same from everywhere: a white furnace, or the light of a closed overcast.",
+            "How bright it is in every direction, as under an overcast sky.",
             unit="W/(m^2 sr)",
             widget="color",
             soft=4,
@@ -77,7 +85,7 @@ class _Picture(_Surroundings):
         Field(ge=0, le=90),
         hint(
             "Blur",
-            "Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias.",
+            "Blurs the surroundings: less noise and softer shadows, but less true to the image.",
             unit="degrees",
             widget="slider",
             soft=30,
@@ -92,7 +100,7 @@ class ImageEnvironment(_Picture):
     asset: Annotated[
         str,
         Field(min_length=1),
-        hint("Image", "An HDR image of all directions: latitude-longitude, EXR or Radiance HDR."),
+        hint("Image", "A panorama of all directions, as an EXR or HDR file."),
     ]
 
 
@@ -136,18 +144,23 @@ class SkyEnvironment(_Surroundings):
     turbidity: Annotated[
         float,
         Field(ge=1, le=10),
-        hint("Turbidity", "Haze: 1 is pure air, 3 a clear day, 6 hazy, 10 murky.", unit="", widget="slider"),
+        hint(
+            "Turbidity",
+            "How hazy the air is: 1 is pure air, 3 a clear day, 6 hazy, 10 murky.",
+            unit="",
+            widget="slider",
+        ),
     ] = 3.0
     ground_albedo: Annotated[
         Fraction,
         hint(
             "Ground albedo",
-            "Share of light that the ground sends back, also into the sky: 0.3 is soil and grass.",
+            "How bright the ground is: 0.3 is soil and grass.",
             unit="",
             widget="slider",
         ),
     ] = 0.3
-    sun: Annotated[bool, hint("Sun", "Off: the dome alone, as if the sun itself were hidden.")] = True
+    sun: Annotated[bool, hint("Sun", "Off: the sky alone, as if the sun were hidden.")] = True
 
 
 Environment = Annotated[

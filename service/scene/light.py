@@ -31,7 +31,7 @@ class PointLight(_Light):
         Intensity,
         hint(
             "Intensity",
-            "The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi).",
+            "How bright it is: the light that falls on a surface 1 m away.",
             unit="W/sr",
             widget="color",
             soft=100,
@@ -50,22 +50,33 @@ class SpotLight(_Light):
 
     type: Literal["spot"]
     position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
-    direction: Annotated[Direction, hint("Direction", "Where the beam points; any length.", unit="", widget="number")]
+    direction: Annotated[
+        Direction, hint("Direction", "The direction in which the beam points.", unit="", widget="number")
+    ]
     intensity: Annotated[
         Intensity,
-        hint("Intensity", "Along the beam: the irradiance it gives 1 m away.", unit="W/sr", widget="color", soft=100),
+        hint(
+            "Intensity",
+            "How bright it is: the light that falls on a surface 1 m away, in the middle of the beam.",
+            unit="W/sr",
+            widget="color",
+            soft=100,
+        ),
     ]
     inner_angle: Annotated[
         HalfAngle,
         hint(
-            "Inner angle", "From the beam's axis to where the light begins to fade.", unit="degrees", widget="angle"
+            "Inner angle",
+            "From the middle of the beam to where the light begins to fade.",
+            unit="degrees",
+            widget="angle",
         ),
     ]
     outer_angle: Annotated[
         HalfAngle,
         hint(
             "Outer angle",
-            "From the beam's axis to where nothing is left; equal to the inner: a sharp edge.",
+            "From the middle of the beam to where nothing is left. The same as the inner angle gives a sharp edge.",
             unit="degrees",
             widget="angle",
         ),
@@ -91,13 +102,13 @@ class DirectionalLight(_Light):
 
     type: Literal["directional"]
     direction: Annotated[
-        Direction, hint("Direction", "The way the light travels; any length.", unit="", widget="number")
+        Direction, hint("Direction", "The direction in which the light travels.", unit="", widget="number")
     ]
     irradiance: Annotated[
         Irradiance,
         hint(
             "Irradiance",
-            "On a surface that faces the light; the sun at noon gives about 1000.",
+            "How bright the light is on a surface that faces it. The sun at noon gives about 1000.",
             unit="W/m^2",
             widget="color",
             soft=10,
@@ -108,7 +119,8 @@ class DirectionalLight(_Light):
         Field(ge=0, le=90),
         hint(
             "Angular diameter",
-            "0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays.",
+            "How large the light looks in the sky: 0 gives sharp shadows, 0.53 is the sun, more is softer. The "
+            "brightness stays.",
             unit="degrees",
             widget="angle",
             soft=10,

@@ -48,7 +48,7 @@ class Medium(Model):
         OMITTABLE,
         hint(
             "Albedo",
-            "The colour of much of it; with a radius, in place of absorption and scattering.",
+            "The colour that much of it has. With a radius it replaces absorption and scattering.",
             unit="",
             widget="color",
             absent="from absorption and scattering",
@@ -72,7 +72,7 @@ class Medium(Model):
         Field(gt=-1, lt=1),
         hint(
             "Direction",
-            "The mean cosine of scattering: above 0 light goes on, below 0 it comes back.",
+            "Where light goes when it is scattered: above 0 onwards, below 0 back.",
             unit="",
             widget="slider",
             soft=(-0.95, 0.95),
@@ -82,7 +82,7 @@ class Medium(Model):
         Radiance,
         hint(
             "Emission",
-            "What each metre of it adds to the radiance along a ray.",
+            "The light that it gives off itself, for each metre.",
             unit="W/(m^3 sr)",
             widget="color",
             soft=4,

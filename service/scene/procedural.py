@@ -34,42 +34,48 @@ class NoiseTexture(Model):
     ] = (1.0, 1.0, 1.0)
     space: Annotated[
         Literal["object", "uv"],
-        hint("Space", "object: solid, in metres before the shape's transform; uv: along its texture coordinates."),
+        hint("Space", "object: solid, as in marble or wood; uv: on the surface, along its texture coordinates."),
     ] = "object"
     scale: Annotated[
         Point, hint("Scale", "Cells of the first octave a metre along x, y and z, or along u and v; unequal numbers "
                              "stretch the pattern.", unit="", widget="number")
     ] = (4.0, 4.0, 4.0)  # fmt: skip
-    offset: Annotated[Point, hint("Offset", "Added after the scale, in cells.", unit="", widget="number")] = (
+    offset: Annotated[Point, hint("Offset", "Moves the pattern, in cells.", unit="", widget="number")] = (
         0.0, 0.0, 0.0,
     )  # fmt: skip
     octaves: Annotated[
-        int, Field(ge=1, le=10), hint("Octaves", "Each adds finer detail, and costs time.", unit="", widget="slider")
+        int,
+        Field(ge=1, le=10),
+        hint("Octaves", "How many layers of finer detail there are. Each costs time.", unit="", widget="slider"),
     ] = 4
     lacunarity: Annotated[
         float, Field(ge=1, le=4),
-        hint("Lacunarity", "How much finer each octave is than the one before.", unit="", widget="slider"),
+        hint("Lacunarity", "How much finer each layer is than the one before.", unit="", widget="slider"),
     ] = 2.0  # fmt: skip
     gain: Annotated[
-        Fraction, hint("Gain", "How much of the octave before each one adds: roughness of the detail.",
+        Fraction, hint("Gain", "How strong each finer layer is: the roughness of the detail.",
                        unit="", widget="slider")
     ] = 0.5  # fmt: skip
-    turbulence: Annotated[bool, hint("Turbulence", "On: creases where the noise changes sign.")] = False
+    turbulence: Annotated[bool, hint("Turbulence", "On: with creases, as in marble.")] = False
     contrast: Annotated[
         float, Field(ge=0, le=1000),
-        hint("Contrast", "About the middle: at 1 noise hardly reaches its ends, at 2 a single octave does.",
+        hint("Contrast", "How far the two colours stand apart.",
              unit="", widget="slider", soft=8),
     ] = 2.0  # fmt: skip
     seed: Annotated[
-        int, Field(ge=0, le=LARGEST_SEED), hint("Seed", "Another one is another pattern.", unit="", widget="number")
+        int,
+        Field(ge=0, le=LARGEST_SEED),
+        hint("Seed", "Another number gives another pattern.", unit="", widget="number"),
     ] = 0
 
 
 class RampStop(Model):
     """A colour, and where the ramp has it."""
 
-    position: Annotated[Fraction, hint("Position", "Along the ramp.", unit="", widget="slider")]
-    color: Annotated[Radiometric, hint("Colour", "There, as a colour or a value.", unit="", widget="color", soft=1)]
+    position: Annotated[
+        Fraction, hint("Position", "Where on the ramp it lies, from 0 to 1.", unit="", widget="slider")
+    ]
+    color: Annotated[Radiometric, hint("Colour", "The colour or value there.", unit="", widget="color", soft=1)]
 
 
 class RampInput(Model):
@@ -101,19 +107,19 @@ class RampTexture(Model):
     input: Annotated[
         Annotated[Literal["u", "v"], Tag(COORDINATE_TAG)] | Annotated[RampInput, Tag(TEXTURE_TAG)],
         Discriminator(_form),
-        hint("Input", "A texture coordinate, or another texture."),
+        hint("Input", "What runs along the ramp: a texture coordinate, or another texture."),
     ] = "u"
     stops: Annotated[
-        list[RampStop], Field(min_length=2, max_length=MOST_STOPS), hint("Stops", "Where it has which colour.")
+        list[RampStop], Field(min_length=2, max_length=MOST_STOPS), hint("Stops", "The colours along the ramp.")
     ]
     interpolation: Annotated[
         Literal["linear", "constant", "smooth"], hint("Interpolation", "How a colour becomes the next one.")
     ] = "linear"
     scale: Annotated[
-        Coordinate, hint("Scale", "Factor on the input: 2 runs through the ramp twice, where it repeats.",
+        Coordinate, hint("Scale", "How often the ramp is run through: 2 runs through it twice, where it repeats.",
                          unit="", widget="number")
     ] = 1.0  # fmt: skip
-    offset: Annotated[Coordinate, hint("Offset", "Added after the scale.", unit="", widget="number")] = 0.0
+    offset: Annotated[Coordinate, hint("Offset", "Moves the colours along the ramp.", unit="", widget="number")] = 0.0
     wrap: Annotated[Literal["clamp", "repeat", "mirror"], hint("Wrap", "What lies beyond the ramp's ends.")] = "clamp"
 
     @property

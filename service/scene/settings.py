@@ -37,7 +37,7 @@ class Settings(Model):
         Field(ge=1, le=2**24),
         hint(
             "Samples",
-            "Paths per pixel at which to stop; four times as many halve the noise.",
+            "When to stop. Four times as many samples halve the noise.",
             unit="",
             widget="number",
             soft=4096,
@@ -50,7 +50,7 @@ class Settings(Model):
         Field(ge=0, le=1024),
         hint(
             "Bounces",
-            "Scattering events on a path: 0 shows emission only, 1 direct light, more the light between.",
+            "How often light may be reflected: 0 shows lamps only, 1 direct light, more the light between things.",
             unit="",
             widget="slider",
             soft=32,
@@ -62,7 +62,7 @@ class Settings(Model):
         OMITTABLE,
         hint(
             "Time limit",
-            "Stops after this time; where no samples are given, nothing else stops it.",
+            "Stops after this time. Without a number of samples, nothing else stops it.",
             unit="s",
             widget="number",
             soft=60,
@@ -73,7 +73,7 @@ class Settings(Model):
         OMITTABLE,
         hint(
             "Target noise",
-            "Stops when the estimated error is this share of the mean brightness; 0.01 looks clean.",
+            "Stops when this little noise is left, as a share of the brightness: 0.01 looks clean.",
             unit="",
             widget="number",
             soft=0.1,
@@ -82,23 +82,23 @@ class Settings(Model):
     seed: Annotated[
         int,
         Field(ge=0, le=2**32 - 1),
-        hint("Seed", "Another one gives another noise of the same size.", unit="", widget="number", soft=100),
+        hint("Seed", "Another number gives other noise, of the same strength.", unit="", widget="number", soft=100),
     ] = 0
     quality: Annotated[
         Literal["draft", "preview", "balanced", "high", "reference"],
-        hint("Quality", "Fills in samples, bounces and roulette where they are not given."),
+        hint("Quality", "Sets samples, bounces and roulette where they are not given."),
     ] = "balanced"
     estimator: Annotated[
         Literal["mis", "bsdf", "light", "uniform"],
-        hint("Estimator", "How light is looked for; mis weighs both ways (Veach), the others are for comparison."),
+        hint("Estimator", "How light is looked for. mis is the best; the others are for comparison."),
     ] = "mis"
     sampler: Annotated[
         Literal["sobol", "independent"],
-        hint("Sampler", "sobol spreads its points evenly, and so needs fewer of them."),
+        hint("Sampler", "How samples are spread. sobol spreads them evenly, and so needs fewer of them."),
     ] = "sobol"
     filter: Annotated[
         Literal["box", "tent", "gaussian", "blackman_harris"],
-        hint("Pixel filter", "How far around a pixel is averaged: box .5 pixels, tent 1, gaussian 2, the last 1.5."),
+        hint("Pixel filter", "How soft the edges of pixels are: box is the sharpest, gaussian the softest."),
     ] = "blackman_harris"
     roulette_depth: Annotated[
         int | None,
@@ -106,7 +106,7 @@ class Settings(Model):
         Field(ge=0, le=1024),
         hint(
             "Roulette from",
-            "Bounces before dim paths may end at random: changes noise and speed, not the mean.",
+            "After how many bounces dim light may be given up: more speed for more noise.",
             unit="",
             widget="slider",
             soft=32,
@@ -119,7 +119,7 @@ class Settings(Model):
         Field(gt=0, le=1),
         hint(
             "Resolution",
-            "Factor on width and height.",
+            "A factor on the width and the height.",
             unit="",
             widget="slider",
             default=BALANCED["resolution_scale"],
@@ -127,14 +127,14 @@ class Settings(Model):
     ] = None
     adaptive: Annotated[
         bool,
-        hint("Adaptive", "More samples where there is more noise, fewer elsewhere; the samples count their mean."),
+        hint("Adaptive", "More samples where there is more noise, fewer elsewhere."),
     ] = False
     clamp: Annotated[
         Annotated[float, Field(gt=0, le=BRIGHTEST)] | None,
         OMITTABLE,
         hint(
             "Clamp",
-            "Bounds the radiance of indirect light: removes fireflies, and some light with them.",
+            "Limits how bright reflected light can be: removes fireflies, and some light with them.",
             unit="W/(m^2 sr)",
             widget="number",
             soft=100,
@@ -145,7 +145,7 @@ class Settings(Model):
         OMITTABLE,
         hint(
             "Caustics",
-            "Traced from the lights or found by the camera's paths; left out: what errs less in the scene.",
+            "How light that glass and mirrors gather is found. Left out, the way with less noise is taken.",
         ),
     ] = None
     filter_glossy: Annotated[
@@ -153,14 +153,14 @@ class Settings(Model):
         Field(ge=0, le=1),
         hint(
             "Filter glossy",
-            "Least roughness of surfaces after a path's first scattering: blurs caustics that are noise, and biases.",
+            "Blurs reflections within reflections: less noise, but less true.",
             unit="",
             widget="slider",
         ),
     ] = 0.0
     denoise: Annotated[
         bool,
-        hint("Denoise", "Filters noise out of the picture while there is much of it; what is shown is then biased."),
+        hint("Denoise", "Filters noise out of the picture."),
     ] = False
 
 

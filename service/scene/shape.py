@@ -23,10 +23,15 @@ class _Placed(Named):
     name: Name = None
     material: Annotated[str, hint("Material", "The name of one of the scene's materials.")]
     transform: Annotated[
-        AnyTransform | None, OMITTABLE, hint("Transform", "Where the shape stands; without it, as written.")
+        AnyTransform | None,
+        OMITTABLE,
+        hint("Transform", "Where the thing stands, how it is turned and how large it is."),
     ] = None
     visible_to_camera: Annotated[
-        bool, hint("Visible to the camera", "Off: the camera looks through it; light, shadow and reflections stay.")
+        bool,
+        hint(
+            "Visible to the camera", "Off: the camera looks through it, but its light, shadow and reflections stay."
+        ),
     ] = True
 
 
@@ -38,7 +43,7 @@ class _Body(_Placed):
         Field(ge=-100, le=100),
         hint(
             "Priority",
-            "Where bodies that light passes through overlap, the highest one is there.",
+            "Where glass, liquids and other clear bodies overlap, the one with the highest number is there.",
             unit="",
             widget="number",
             soft=(-10, 10),
@@ -84,7 +89,7 @@ class DiskShape(_Placed):
     type: Literal["disk"]
     center: Annotated[Point, hint("Centre", "The middle of the disk.", unit="m", widget="number")]
     normal: Annotated[
-        Direction, hint("Normal", "The way its front faces, to which it emits; any length.", unit="", widget="number")
+        Direction, hint("Normal", "The direction in which its front faces, and shines.", unit="", widget="number")
     ]
     radius: Annotated[
         PositiveLength, hint("Radius", "From the centre to the rim.", unit="m", widget="slider", soft=5)
@@ -96,23 +101,19 @@ class CylinderShape(_Body):
 
     type: Literal["cylinder"]
     base: Annotated[Point, hint("Base", "The middle of the end where it begins.", unit="m", widget="number")]
-    axis: Annotated[
-        Direction, hint("Axis", "From the base to the other end, with its length.", unit="m", widget="number")
+    axis: Annotated[Direction, hint("Axis", "From the base to the other end.", unit="m", widget="number")]
+    radius: Annotated[
+        PositiveLength, hint("Radius", "From the middle to the side.", unit="m", widget="slider", soft=5)
     ]
-    radius: Annotated[PositiveLength, hint("Radius", "From the axis to the side.", unit="m", widget="slider", soft=5)]
-    caps: Annotated[
-        bool, hint("Caps", "Off: both ends are open, and the side is a sheet that is seen from within, too.")
-    ] = True
+    caps: Annotated[bool, hint("Caps", "Off: both ends are open, and you can see its inside.")] = True
 
 
 class BoxShape(_Body):
     """A box along the axes; a transform turns it."""
 
     type: Literal["box"]
-    min: Annotated[Point, hint("Lower corner", "The least x, y and z.", unit="m", widget="number")]
-    max: Annotated[
-        Point, hint("Upper corner", "The greatest x, y and z: each above the lower's.", unit="m", widget="number")
-    ]
+    min: Annotated[Point, hint("Lower corner", "The corner with the smallest x, y and z.", unit="m", widget="number")]
+    max: Annotated[Point, hint("Upper corner", "The corner with the largest x, y and z.", unit="m", widget="number")]
 
     @model_validator(mode="after")
     def _has_volume(self) -> Self:
@@ -168,18 +169,18 @@ class MeshShape(_Body):
     smooth: Annotated[
         bool | None,
         OMITTABLE,
-        hint("Smooth", "On: vertex normals; off: facets; neither: as the file says, which for STL is facets."),
+        hint("Smooth", "On: rounded; off: with flat facets; neither: as the file says."),
     ] = None
-    double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")] = True
+    double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there.")] = True
     displacement: Annotated[
-        bool, hint("Displacement", "On: the material's height moves the surface, in triangles of at most that edge.")
+        bool, hint("Displacement", "On: the height of the material moves the surface itself.")
     ] = False
     max_edge: Annotated[
         PositiveLength | None,
         OMITTABLE,
         hint(
             "Longest edge",
-            "Of the triangles of a displaced mesh: shorter edges show finer relief and take more memory.",
+            "The longest edge of the triangles: shorter edges show finer relief and take more memory.",
             unit="m",
             widget="number",
             absent="1/200 of its size",

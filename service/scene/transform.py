@@ -21,18 +21,20 @@ Matrix = tuple[float, ...]
 class Transform(Model):
     """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
 
-    translate: Annotated[Point, hint("Move", "Applied last.", unit="m", widget="number")] = (0.0, 0.0, 0.0)
+    translate: Annotated[Point, hint("Move", "Moves the thing along X, Y and Z.", unit="m", widget="number")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     rotate: Annotated[
         Point,
-        hint(
-            "Rotate", "About X first, then Y, then Z; right-handed.", unit="degrees", widget="angle", soft=(-180, 180)
-        ),
+        hint("Rotate", "Turns the thing about X, then Y, then Z.", unit="degrees", widget="angle", soft=(-180, 180)),
     ] = (0.0, 0.0, 0.0)
     scale: Annotated[
         ScaleFactors,
         hint(
             "Scale",
-            "One factor, or one per axis; negative mirrors, zero is an error.",
+            "How large the thing is: one factor, or one for each axis. Negative factors mirror it.",
             unit="",
             widget="number",
             soft=(0.1, 10),

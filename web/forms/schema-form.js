@@ -122,6 +122,7 @@ export function schemaForm(fields, acts) {
           "unused",
           Boolean(field.used) && !field.used.values.includes(valueOf(field.used.field)),
         );
+        each.element.hidden = (values[field.unless] ?? null) !== null;
       }
       parts?.show(values);
     },

@@ -138,6 +138,7 @@ function field(schema, name, raw, required) {
     follows: bound(nodes, "x-follows"),
     ranges: bound(nodes, "x-ranges"),
     used: bound(nodes, "x-used"),
+    unless: bound(nodes, "x-unless"),
     beside: bound(nodes, "x-beside"),
     example: bound(nodes, "examples")?.[0],
     // What a material has three of is one for each channel; anywhere else three numbers go along the axes.

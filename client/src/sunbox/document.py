@@ -64,25 +64,25 @@ class BlinnPhongMaterial(TypedDict, total=False):
     diffuse: Required[list[float] | float | str | ColorTexture]
     """Share of light that is sent back equally in all directions. (0 to 1)"""
     specular: Required[list[float] | float | str | ColorTexture]
-    """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
+    """The colour of the highlight. A sharper highlight sends back less light. (0 to 1)"""
     shininess: Required[float | ScalarTexture]
-    """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
+    """How tight the highlight is: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
     ambient: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
+    """Light that is added wherever the surface is seen; it does not light other things. (W/(m^2 sr), 0 to 1e+20,
     default [0.0, 0.0, 0.0])"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class MatrixTransform(TypedDict, total=False):
@@ -100,46 +100,48 @@ class Medium(TypedDict, total=False):
     scattering: list[float] | float | str | dict[str, Any]
     """The rate at which light turns, per channel. (1/m, 0 to 1e+09, default [0.0, 0.0, 0.0])"""
     albedo: list[float] | float | str
-    """The colour of much of it; with a radius, in place of absorption and scattering. (0 to 1)"""
+    """The colour that much of it has. With a radius it replaces absorption and scattering. (0 to 1)"""
     radius: list[float] | float | str | dict[str, Any]
     """How far light goes, on average, before something happens to it, per channel. (m, 0 to 1e+09)"""
     g: float
-    """The mean cosine of scattering: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
+    """Where light goes when it is scattered: above 0 onwards, below 0 back. (-1 to 1, default 0.0)"""
     emission: list[float] | float | str | dict[str, Any]
-    """What each metre of it adds to the radiance along a ray. (W/(m^3 sr), 0 to 1e+20, default [0.0, 0.0, 0.0])"""
+    """The light that it gives off itself, for each metre. (W/(m^3 sr), 0 to 1e+20, default [0.0, 0.0, 0.0])"""
 
 
 class Transform(TypedDict, total=False):
     """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
 
     translate: list[float]
-    """Applied last. (m, default [0.0, 0.0, 0.0])"""
+    """Moves the thing along X, Y and Z. (m, default [0.0, 0.0, 0.0])"""
     rotate: list[float]
-    """About X first, then Y, then Z; right-handed. (degrees, default [0.0, 0.0, 0.0])"""
+    """Turns the thing about X, then Y, then Z. (degrees, default [0.0, 0.0, 0.0])"""
     scale: float | list[float]
-    """One factor, or one per axis; negative mirrors, zero is an error. (default [1.0, 1.0, 1.0])"""
+    """How large the thing is: one factor, or one for each axis. Negative factors mirror it. (default [1.0, 1.0,
+    1.0])"""
 
 
 class BoxShape(TypedDict, total=False):
     """A box along the axes; a transform turns it."""
 
     priority: int
-    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    """Where glass, liquids and other clear bodies overlap, the one with the highest number is there. (-100 to 100,
+    default 0)"""
     medium: Medium
     """What fills it, behind a surface that transmits."""
     type: Required[Literal["box"]]
     min: Required[list[float]]
-    """The least x, y and z. (m)"""
+    """The corner with the smallest x, y and z. (m)"""
     max: Required[list[float]]
-    """The greatest x, y and z: each above the lower's. (m)"""
+    """The corner with the largest x, y and z. (m)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class CheckerTexture(TypedDict, total=False):
@@ -162,13 +164,13 @@ class ConstantEnvironment(TypedDict, total=False):
 
     type: Required[Literal["constant"]]
     radiance: Required[list[float] | float | str | dict[str, Any]]
-    """The same from everywhere: a white furnace, or the light of a closed overcast. (W/(m^2 sr), 0 to 1e+20)"""
+    """How bright it is in every direction, as under an overcast sky. (W/(m^2 sr), 0 to 1e+20)"""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
     scale: float
-    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    """How bright the surroundings are. Twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
-    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    """Off: it lights the scene, but the picture is transparent where it would be seen. (default True)"""
     medium: Medium
     """What fills all space outside of bodies: fog, or the sea."""
 
@@ -194,17 +196,17 @@ class CubemapEnvironment(TypedDict, total=False):
     """Six HDR images, the faces of a cube."""
 
     blur: float
-    """Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias. (degrees, 0 to
-    90, default 0.0)"""
+    """Blurs the surroundings: less noise and softer shadows, but less true to the image. (degrees, 0 to 90, default
+    0.0)"""
     type: Required[Literal["cubemap"]]
     assets: Required[CubeFaces]
     """Six square HDR images of one size."""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
     scale: float
-    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    """How bright the surroundings are. Twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
-    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    """Off: it lights the scene, but the picture is transparent where it would be seen. (default True)"""
     medium: Medium
     """What fills all space outside of bodies: fog, or the sea."""
 
@@ -213,26 +215,27 @@ class CylinderShape(TypedDict, total=False):
     """A cylinder between two flat caps, or an open tube."""
 
     priority: int
-    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    """Where glass, liquids and other clear bodies overlap, the one with the highest number is there. (-100 to 100,
+    default 0)"""
     medium: Medium
     """What fills it, behind a surface that transmits."""
     type: Required[Literal["cylinder"]]
     base: Required[list[float]]
     """The middle of the end where it begins. (m)"""
     axis: Required[list[float]]
-    """From the base to the other end, with its length. (m)"""
+    """From the base to the other end. (m)"""
     radius: Required[float]
-    """From the axis to the side. (m, 0 to 1e+09)"""
+    """From the middle to the side. (m, 0 to 1e+09)"""
     caps: bool
-    """Off: both ends are open, and the side is a sheet that is seen from within, too. (default True)"""
+    """Off: both ends are open, and you can see its inside. (default True)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class DiffuseMaterial(TypedDict, total=False):
@@ -240,20 +243,21 @@ class DiffuseMaterial(TypedDict, total=False):
 
     type: Required[Literal["diffuse"]]
     albedo: Required[list[float] | float | str | ColorTexture]
-    """Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04. (0 to 1)"""
+    """The colour, as the share of light that is sent back: snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04. (0
+    to 1)"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class DirectionalLight(TypedDict, total=False):
@@ -261,11 +265,12 @@ class DirectionalLight(TypedDict, total=False):
 
     type: Required[Literal["directional"]]
     direction: Required[list[float]]
-    """The way the light travels; any length."""
+    """The direction in which the light travels."""
     irradiance: Required[list[float] | float | str | dict[str, Any]]
-    """On a surface that faces the light; the sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
+    """How bright the light is on a surface that faces it. The sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
     angular_diameter: float
-    """0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays. (degrees, 0 to 90, default 0.0)"""
+    """How large the light looks in the sky: 0 gives sharp shadows, 0.53 is the sun, more is softer. The brightness
+    stays. (degrees, 0 to 90, default 0.0)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
@@ -277,7 +282,7 @@ class DiskShape(TypedDict, total=False):
     center: Required[list[float]]
     """The middle of the disk. (m)"""
     normal: Required[list[float]]
-    """The way its front faces, to which it emits; any length."""
+    """The direction in which its front faces, and shines."""
     radius: Required[float]
     """From the centre to the rim. (m, 0 to 1e+09)"""
     name: str
@@ -285,9 +290,9 @@ class DiskShape(TypedDict, total=False):
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class DisneyMaterial(TypedDict, total=False):
@@ -295,58 +300,60 @@ class DisneyMaterial(TypedDict, total=False):
 
     type: Required[Literal["disney"]]
     base_color: list[float] | float | str | ColorTexture
-    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.5, 0.5,
-    0.5])"""
+    """The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9. (0 to 1, default
+    [0.5, 0.5, 0.5])"""
     subsurface: float | ScalarTexture
-    """Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger). (0 to 1, default 0.0)"""
+    """A flatter, softer shade, as of skin or wax. (0 to 1, default 0.0)"""
     metallic: float | ScalarTexture
-    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    """0 is no metal, 1 is metal. Values between are for dust, rust or blends. (0 to 1, default 0.0)"""
     specular: float | ScalarTexture
-    """Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5. (0 to 1, default 0.5)"""
+    """How much the surface mirrors where you look straight at it: 0.5 is 4 %, as of plastic and glass. (0 to 1,
+    default 0.5)"""
     specular_tint: float | ScalarTexture
-    """Tints the dielectric's reflection head-on to the base colour; grazing stays white. (0 to 1, default 0.0)"""
+    """Tints the reflection with the base colour where you look straight at it; the rim stays white. (0 to 1, default
+    0.0)"""
     roughness: float | ScalarTexture
-    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.5)"""
+    """0 is polished, 1 is matte. (0 to 1, default 0.5)"""
     anisotropic: float | ScalarTexture
-    """Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1. (0 to 1, default 0.0)"""
+    """Stretches the highlight, as on brushed metal: at 1 it is ten times as long as wide. (0 to 1, default 0.0)"""
     sheen: float | ScalarTexture
-    """Extra light at grazing angles, for cloth. (0 to 1, default 0.0)"""
+    """A soft bright rim, as of cloth. (0 to 1, default 0.0)"""
     sheen_tint: float | ScalarTexture
-    """Tints the sheen from white to the base colour. (0 to 1, default 0.5)"""
+    """Tints the sheen from white towards the base colour. (0 to 1, default 0.5)"""
     clearcoat: float | ScalarTexture
-    """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
+    """A thin layer of clear lacquer on top. (0 to 1, default 0.0)"""
     clearcoat_gloss: float | ScalarTexture
-    """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
+    """1 is a glossy lacquer, 0 a satin one. (0 to 1, default 1.0)"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class ImageEnvironment(TypedDict, total=False):
     """A latitude-longitude image; -Z is in its middle."""
 
     blur: float
-    """Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias. (degrees, 0 to
-    90, default 0.0)"""
+    """Blurs the surroundings: less noise and softer shadows, but less true to the image. (degrees, 0 to 90, default
+    0.0)"""
     type: Required[Literal["image"]]
     asset: Required[str]
-    """An HDR image of all directions: latitude-longitude, EXR or Radiance HDR."""
+    """A panorama of all directions, as an EXR or HDR file."""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
     scale: float
-    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    """How bright the surroundings are. Twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
-    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    """Off: it lights the scene, but the picture is transparent where it would be seen. (default True)"""
     medium: Medium
     """What fills all space outside of bodies: fog, or the sea."""
 
@@ -381,25 +388,26 @@ class MeasuredMaterial(TypedDict, total=False):
     asset: Required[str]
     """A MERL .binary or an RGL .bsdf file."""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class MeshShape(TypedDict, total=False):
     """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
 
     priority: int
-    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    """Where glass, liquids and other clear bodies overlap, the one with the highest number is there. (-100 to 100,
+    default 0)"""
     medium: Medium
     """What fills it, behind a surface that transmits."""
     type: Required[Literal["mesh"]]
@@ -416,21 +424,21 @@ class MeshShape(TypedDict, total=False):
     colors: list[list[float]]
     """One row per vertex, linear, perhaps with alpha; they multiply the material's."""
     smooth: bool
-    """On: vertex normals; off: facets; neither: as the file says, which for STL is facets."""
+    """On: rounded; off: with flat facets; neither: as the file says."""
     double_sided: bool
-    """Off: from behind it is not there, for any ray. (default True)"""
+    """Off: from behind it is not there. (default True)"""
     displacement: bool
-    """On: the material's height moves the surface, in triangles of at most that edge. (default False)"""
+    """On: the height of the material moves the surface itself. (default False)"""
     max_edge: float
-    """Of the triangles of a displaced mesh: shorter edges show finer relief and take more memory. (m, 0 to 1e+09)"""
+    """The longest edge of the triangles: shorter edges show finer relief and take more memory. (m, 0 to 1e+09)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class MetalRoughMaterial(TypedDict, total=False):
@@ -438,24 +446,24 @@ class MetalRoughMaterial(TypedDict, total=False):
 
     type: Required[Literal["metal_rough"]]
     base_color: Required[list[float] | float | str | ColorTexture]
-    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1)"""
+    """The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9. (0 to 1)"""
     metallic: Required[float | ScalarTexture]
-    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1)"""
+    """0 is no metal, 1 is metal. Values between are for dust, rust or blends. (0 to 1)"""
     roughness: Required[float | ScalarTexture]
-    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1)"""
+    """0 is polished, 1 is matte. (0 to 1)"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class MicrofacetMaterial(TypedDict, total=False):
@@ -463,39 +471,38 @@ class MicrofacetMaterial(TypedDict, total=False):
 
     type: Required[Literal["microfacet"]]
     distribution: Literal["phong", "beckmann", "ggx", "gtr", "abc", "sgd", "gaussian"]
-    """How the normals of the microfacets are spread: D, normalised. (default 'ggx')"""
+    """How the tiny facets of the surface are tilted (D). (default 'ggx')"""
     alpha: float | ScalarTexture
-    """The distribution's parameter: a width; for phong an exponent, for abc an inverse width. (0 to 1e+06, default
-    0.25)"""
+    """How wide the highlight is; for Phong an exponent, for ABC an inverse width. (0 to 1e+06, default 0.25)"""
     gamma: float
-    """How soon the tail falls off, for gtr, abc and sgd; the others do not use it. (0 to 1000, default 2.0)"""
+    """How soon the highlight fades towards its rim. (0 to 1000, default 2.0)"""
     geometry: Literal["implicit", "neumann", "cook_torrance", "kelemen", "schlick_ggx", "smith", "smith_correlated"]
-    """The share of the microfacets that is neither masked nor shadowed: G. (default 'smith')"""
+    """How the tiny facets hide each other (G). (default 'smith')"""
     fresnel: Literal["none", "schlick", "cook_torrance", "dielectric", "conductor"]
-    """The reflectance of one microfacet: F. (default 'schlick')"""
+    """How one facet mirrors (F). (default 'schlick')"""
     f0: list[float] | float | str | ColorTexture
-    """Reflectance head-on, for schlick and cook_torrance. (0 to 1, default [0.04, 0.04, 0.04])"""
+    """How much is mirrored where you look straight at it. (0 to 1, default [0.04, 0.04, 0.04])"""
     ior: float
-    """For dielectric: water 1.33, glass 1.5, diamond 2.42. (1 to 4, default 1.5)"""
+    """How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. (1 to 4, default 1.5)"""
     conductor_eta: list[float] | float
-    """For conductor: its index of refraction, per channel. (1e-30 to 1e+09)"""
+    """The index of refraction as measured, for red, green and blue. (1e-30 to 1e+09)"""
     conductor_k: list[float] | float
-    """For conductor: its extinction coefficient, per channel. (0 to 1e+09)"""
+    """The extinction coefficient as measured, for red, green and blue. (0 to 1e+09)"""
     diffuse: list[float] | float | str | ColorTexture
-    """Albedo of the diffuse lobe, which is added to the facets. (0 to 1, default [0.0, 0.0, 0.0])"""
+    """The colour of the matte part, which is added to the highlight. (0 to 1, default [0.0, 0.0, 0.0])"""
     diffuse_model: Literal["lambert", "oren_nayar", "disney", "eon"]
-    """The shape of the diffuse lobe. (default 'lambert')"""
+    """How the matte part is shaded. (default 'lambert')"""
     diffuse_roughness: float
-    """Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it. (0 to 1, default 0.0)"""
+    """How flat the matte part looks, as clay or plaster do. (0 to 1, default 0.0)"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class NoiseTexture(TypedDict, total=False):
@@ -512,24 +519,24 @@ class NoiseTexture(TypedDict, total=False):
     b: list[float] | float | str | dict[str, Any]
     """The colour or value where it is highest. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
     space: Literal["object", "uv"]
-    """object: solid, in metres before the shape's transform; uv: along its texture coordinates. (default 'object')"""
+    """object: solid, as in marble or wood; uv: on the surface, along its texture coordinates. (default 'object')"""
     scale: list[float]
     """Cells of the first octave a metre along x, y and z, or along u and v; unequal numbers stretch the pattern.
     (default [4.0, 4.0, 4.0])"""
     offset: list[float]
-    """Added after the scale, in cells. (default [0.0, 0.0, 0.0])"""
+    """Moves the pattern, in cells. (default [0.0, 0.0, 0.0])"""
     octaves: int
-    """Each adds finer detail, and costs time. (1 to 10, default 4)"""
+    """How many layers of finer detail there are. Each costs time. (1 to 10, default 4)"""
     lacunarity: float
-    """How much finer each octave is than the one before. (1 to 4, default 2.0)"""
+    """How much finer each layer is than the one before. (1 to 4, default 2.0)"""
     gain: float
-    """How much of the octave before each one adds: roughness of the detail. (0 to 1, default 0.5)"""
+    """How strong each finer layer is: the roughness of the detail. (0 to 1, default 0.5)"""
     turbulence: bool
-    """On: creases where the noise changes sign. (default False)"""
+    """On: with creases, as in marble. (default False)"""
     contrast: float
-    """About the middle: at 1 noise hardly reaches its ends, at 2 a single octave does. (0 to 1000, default 2.0)"""
+    """How far the two colours stand apart. (0 to 1000, default 2.0)"""
     seed: int
-    """Another one is another pattern. (0 to 4.29497e+09, default 0)"""
+    """Another number gives another pattern. (0 to 4.29497e+09, default 0)"""
 
 
 class OpenpbrMaterial(TypedDict, total=False):
@@ -537,100 +544,97 @@ class OpenpbrMaterial(TypedDict, total=False):
 
     type: Required[Literal["openpbr"]]
     base_weight: float | ScalarTexture
-    """A factor on the base colour. (0 to 1, default 1.0)"""
+    """How strong the base colour is. (0 to 1, default 1.0)"""
     base_color: list[float] | float | str | ColorTexture
-    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.8, 0.8,
-    0.8])"""
+    """The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9. (0 to 1, default
+    [0.8, 0.8, 0.8])"""
     base_diffuse_roughness: float | ScalarTexture
-    """0 is Lambert's; above it flatter, as of clay or plaster. (0 to 1, default 0.0)"""
+    """0 is smooth; above it the surface looks flatter, as clay or plaster do. (0 to 1, default 0.0)"""
     base_metalness: float | ScalarTexture
-    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    """0 is no metal, 1 is metal. Values between are for dust, rust or blends. (0 to 1, default 0.0)"""
     specular_weight: float | ScalarTexture
-    """A factor on what a dielectric reflects head-on, or a metal at all; none reflects more than all. (0 to 1e+20,
-    default 1.0)"""
+    """How strongly the surface mirrors. (0 to 1e+20, default 1.0)"""
     specular_color: list[float] | float | str | ColorTexture
-    """Tints a dielectric's reflection, or a metal's near grazing angles. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """Tints the reflection; of a metal, only its rim. (0 to 1, default [1.0, 1.0, 1.0])"""
     specular_roughness: float | ScalarTexture
-    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.3)"""
+    """0 is polished, 1 is matte. (0 to 1, default 0.3)"""
     specular_roughness_anisotropy: float | ScalarTexture
-    """Stretches the highlight along the tangent, as of brushed metal; above 0.9 is as 0.9. (0 to 1, default 0.0)"""
+    """Stretches the highlight, as on brushed metal; above 0.9 nothing changes any more. (0 to 1, default 0.0)"""
     specular_ior: float | ScalarTexture
-    """Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one. A texture gives 1 to 4. (0.001
-    to 1000, default 1.5)"""
+    """How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. A texture gives 1 to 4. (0.001 to
+    1000, default 1.5)"""
     transmission_weight: float | ScalarTexture
-    """Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default
-    0.0)"""
+    """How clear the material is: 1 is glass. (0 to 1, default 0.0)"""
     transmission_color: list[float] | float | str | ColorTexture
-    """Tints light that passes the surface, or by the transmission depth the inside. (0 to 1, default [1.0, 1.0,
-    1.0])"""
+    """The colour of light that has gone through the material. (0 to 1, default [1.0, 1.0, 1.0])"""
     transmission_depth: float
-    """How far inside light takes the transmission colour; 0: it is tinted where it passes the surface. (m, 0 to
-    1e+09, default 0.0)"""
+    """How far light goes through the material until it has the transmission colour. 0: it is tinted at the surface.
+    (m, 0 to 1e+09, default 0.0)"""
     transmission_scatter: list[float] | float | str
-    """How much of the light turns inside, over the transmission depth. (0 to 1, default [0.0, 0.0, 0.0])"""
+    """How milky the inside is. (0 to 1, default [0.0, 0.0, 0.0])"""
     transmission_scatter_anisotropy: float
-    """The mean cosine of a turn inside: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
+    """Where light goes when it is scattered: above 0 onwards, below 0 back. (-1 to 1, default 0.0)"""
     transmission_dispersion_scale: float
-    """How much of the dispersion that the Abbe number stands for; 0 is none. (0 to 1, default 0.0)"""
+    """How much light is split into colours, as by a prism: 0 is not at all. (0 to 1, default 0.0)"""
     transmission_dispersion_abbe_number: float
-    """How little refracted light spreads into colours: flint 30, diamond 55, crown 60. (0 to 1e+09, default 20.0)"""
+    """Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60. (0 to
+    1e+09, default 20.0)"""
     subsurface_weight: float | ScalarTexture
-    """Share of the diffuse light that walks below the surface, as in skin, wax or milk. (0 to 1, default 0.0)"""
+    """How much of the light wanders below the surface, as in skin, wax or milk. (0 to 1, default 0.0)"""
     subsurface_color: list[float] | float | str | ColorTexture
-    """What much of it shows head-on. (0 to 1, default [0.8, 0.8, 0.8])"""
+    """The colour that a thick piece of it has. (0 to 1, default [0.8, 0.8, 0.8])"""
     subsurface_radius: float
     """How far light goes below the surface between turns; 0: it comes back where it enters. (m, 0 to 1e+09, default
     1.0)"""
     subsurface_radius_scale: list[float] | float | str
     """A factor on the radius, per channel. (0 to 1, default [1.0, 0.5, 0.25])"""
     subsurface_scatter_anisotropy: float
-    """The mean cosine of a turn: above 0 light goes on, below 0 it comes back. (-1 to 1, default 0.0)"""
+    """Where light goes when it is scattered: above 0 onwards, below 0 back. (-1 to 1, default 0.0)"""
     coat_weight: float | ScalarTexture
-    """How much of the surface a clear coat covers. (0 to 1, default 0.0)"""
+    """How much of the surface is covered by clear lacquer. (0 to 1, default 0.0)"""
     coat_color: list[float] | float | str | ColorTexture
-    """What is left of white light that passes the coat twice, straight. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """The tint of the lacquer. (0 to 1, default [1.0, 1.0, 1.0])"""
     coat_roughness: float | ScalarTexture
-    """Of the coat's own highlight; it makes those below rougher, too. (0 to 1, default 0.0)"""
+    """How rough the lacquer is: 0 is a perfect varnish. (0 to 1, default 0.0)"""
     coat_roughness_anisotropy: float | ScalarTexture
-    """Stretches the coat's highlight along the coat's tangent. (0 to 1, default 0.0)"""
+    """Stretches the highlight of the lacquer. (0 to 1, default 0.0)"""
     coat_ior: float | ScalarTexture
-    """Of the coat's refraction; lacquer is 1.5 to 1.6. (0.001 to 1000, default 1.6)"""
+    """How strongly the lacquer bends and mirrors light: 1.5 to 1.6. (0.001 to 1000, default 1.6)"""
     coat_darkening: float | ScalarTexture
-    """How much reflections inside the coat darken what lies under it; 1 is what they do. (0 to 1, default 1.0)"""
+    """How much the lacquer deepens the colours under it, as varnish does wood. (0 to 1, default 1.0)"""
     fuzz_weight: float | ScalarTexture
-    """How much of the surface fibres or dust cover. (0 to 1, default 0.0)"""
+    """How much of the surface is covered by fibres or dust. (0 to 1, default 0.0)"""
     fuzz_color: list[float] | float | str | ColorTexture
-    """Of the light that the fuzz reflects. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """The colour of the fibres or the dust. (0 to 1, default [1.0, 1.0, 1.0])"""
     fuzz_roughness: float | ScalarTexture
-    """How far it reaches from grazing angles inwards; cloth is low, dust high. (0 to 1, default 0.5)"""
+    """How far the fuzz reaches inwards from the rim: cloth is low, dust high. (0 to 1, default 0.5)"""
     thin_film_weight: float | ScalarTexture
-    """How much of the base a thin film covers, whose colours are those of interference. (0 to 1, default 0.0)"""
+    """How much of the surface has a thin film, with the colours of a soap bubble. (0 to 1, default 0.0)"""
     thin_film_thickness: float | ScalarTexture
     """Soap 0.2 to 0.8, oxides of metals 0.03 to 0.2. (um, 0 to 1e+20, default 0.5)"""
     thin_film_ior: float | ScalarTexture
-    """Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6; below 1 it is taken as 1. A texture gives 1 to 4. (0.001 to
-    1000, default 1.4)"""
+    """How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. A texture gives 1 to 4.
+    (0.001 to 1000, default 1.4)"""
     emission_luminance: float
-    """Luminance that leaves the front side, times the colour: above 0 the shape is an area light. (cd/m^2, 0 to
-    1e+20, default 0.0)"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (cd/m^2, 0 to 1e+20, default 0.0)"""
     emission_color: list[float] | float | str | dict[str, Any] | ColorTexture
-    """A factor on the emission. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
+    """The colour of the light. (0 to 1e+20, default [1.0, 1.0, 1.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     geometry_opacity: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     geometry_thin_walled: bool
-    """A sheet without an inside: light goes straight through. (default False)"""
+    """A sheet without an inside, such as a window pane: light goes straight through. (default False)"""
     geometry_normal: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     geometry_tangent: list[float]
-    """Where anisotropy stretches highlights: x along growing u, y along growing v."""
+    """The direction in which highlights are stretched, along the texture coordinates u and v."""
     geometry_coat_normal: NormalTexture
-    """The coat's own; without it the coat is smooth over whatever is under it."""
+    """Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it."""
     geometry_coat_tangent: list[float]
-    """Where the coat's anisotropy stretches its highlights."""
+    """The direction in which the highlights of the lacquer are stretched."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class OrthographicCamera(TypedDict, total=False):
@@ -644,7 +648,7 @@ class OrthographicCamera(TypedDict, total=False):
     target: Required[list[float]]
     """The point in the middle of the picture. (m)"""
     up: list[float]
-    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+    """The direction that is upward in the picture. (default [0.0, 1.0, 0.0])"""
 
 
 class PanoramaCamera(TypedDict, total=False):
@@ -657,7 +661,7 @@ class PanoramaCamera(TypedDict, total=False):
     target: Required[list[float]]
     """The point in the middle of the picture. (m)"""
     up: list[float]
-    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+    """The direction that is upward in the picture. (default [0.0, 1.0, 0.0])"""
 
 
 class PerspectiveCamera(TypedDict, total=False):
@@ -666,17 +670,18 @@ class PerspectiveCamera(TypedDict, total=False):
     type: Literal["perspective"]
     """default 'perspective'"""
     vfov: float
-    """Vertical angle; 40 is a short telephoto, 75 a wide angle. (degrees, 0 to 180, default 40.0)"""
+    """How much the picture takes in from top to bottom: 40 is a short telephoto, 75 a wide angle. (degrees, 0 to 180,
+    default 40.0)"""
     aperture_radius: float
-    """0 is a pinhole, sharp everywhere; larger blurs what is out of focus. (m, 0 to 1e+09, default 0.0)"""
+    """0 is sharp everywhere. Larger blurs what is out of focus. (m, 0 to 1e+09, default 0.0)"""
     focus_distance: float
-    """Along the axis to the plane that is sharp; without it, the target's. (m, 0 to 1e+09)"""
+    """How far away things are sharp. Without it, at the target. (m, 0 to 1e+09)"""
     position: Required[list[float]]
     """Where the camera stands. (m)"""
     target: Required[list[float]]
     """The point in the middle of the picture. (m)"""
     up: list[float]
-    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+    """The direction that is upward in the picture. (default [0.0, 1.0, 0.0])"""
 
 
 class PhongMaterial(TypedDict, total=False):
@@ -686,25 +691,25 @@ class PhongMaterial(TypedDict, total=False):
     diffuse: Required[list[float] | float | str | ColorTexture]
     """Share of light that is sent back equally in all directions. (0 to 1)"""
     specular: Required[list[float] | float | str | ColorTexture]
-    """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
+    """The colour of the highlight. A sharper highlight sends back less light. (0 to 1)"""
     shininess: Required[float | ScalarTexture]
-    """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
+    """How tight the highlight is: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
     ambient: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
+    """Light that is added wherever the surface is seen; it does not light other things. (W/(m^2 sr), 0 to 1e+20,
     default [0.0, 0.0, 0.0])"""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class PointLight(TypedDict, total=False):
@@ -714,7 +719,7 @@ class PointLight(TypedDict, total=False):
     position: Required[list[float]]
     """Where the light stands. (m)"""
     intensity: Required[list[float] | float | str | dict[str, Any]]
-    """The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi). (W/sr, 0 to 1e+20)"""
+    """How bright it is: the light that falls on a surface 1 m away. (W/sr, 0 to 1e+20)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
@@ -724,83 +729,90 @@ class PrincipledMaterial(TypedDict, total=False):
 
     type: Required[Literal["principled"]]
     base_color: list[float] | float | str | ColorTexture
-    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.5, 0.5,
-    0.5])"""
+    """The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9. (0 to 1, default
+    [0.5, 0.5, 0.5])"""
     subsurface: float | ScalarTexture
     """Share of the diffuse light that comes out beside where it went in; without a radius a flatter shade. (0 to 1,
     default 0.0)"""
     metallic: float | ScalarTexture
-    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    """0 is no metal, 1 is metal. Values between are for dust, rust or blends. (0 to 1, default 0.0)"""
     specular: float | ScalarTexture
-    """Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5. (0 to 1, default 0.5)"""
+    """How much the surface mirrors where you look straight at it: 0.5 is 4 %, as of plastic and glass. (0 to 1,
+    default 0.5)"""
     specular_tint: float | ScalarTexture
-    """Tints the dielectric's reflection head-on to the base colour; grazing stays white. (0 to 1, default 0.0)"""
+    """Tints the reflection with the base colour where you look straight at it; the rim stays white. (0 to 1, default
+    0.0)"""
     roughness: float | ScalarTexture
-    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.5)"""
+    """0 is polished, 1 is matte. (0 to 1, default 0.5)"""
     anisotropic: float | ScalarTexture
-    """Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1. (0 to 1, default 0.0)"""
+    """Stretches the highlight, as on brushed metal: at 1 it is ten times as long as wide. (0 to 1, default 0.0)"""
     sheen: float | ScalarTexture
-    """Extra light at grazing angles, for cloth. (0 to 1, default 0.0)"""
+    """A soft bright rim, as of cloth. (0 to 1, default 0.0)"""
     sheen_tint: float | ScalarTexture
-    """Tints the sheen from white to the base colour. (0 to 1, default 0.5)"""
+    """Tints the sheen from white towards the base colour. (0 to 1, default 0.5)"""
     clearcoat: float | ScalarTexture
-    """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
+    """A thin layer of clear lacquer on top. (0 to 1, default 0.0)"""
     clearcoat_gloss: float | ScalarTexture
-    """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
+    """1 is a glossy lacquer, 0 a satin one. (0 to 1, default 1.0)"""
     subsurface_radius: list[float] | float | str | dict[str, Any]
     """How far light goes below the surface between turns, per channel; without it, subsurface is a flatter shade. (m,
     0 to 1e+09)"""
     transmission: float | ScalarTexture
-    """Share of the base that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default 0.0)"""
+    """How clear the material is: 1 is glass. (0 to 1, default 0.0)"""
     ior: float | ScalarTexture
-    """Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise. (1 to 4)"""
+    """How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. It takes the place of specular.
+    (1 to 4)"""
     abbe: float
-    """Spreads what glass refracts into colours: flint 30, diamond 55, crown 60; without it, none. (0 to 1e+09)"""
+    """Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60. (0 to
+    1e+09)"""
     attenuation_color: list[float] | float | str | ColorTexture
-    """What is left of white light after the attenuation distance inside. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """The colour of white light after the attenuation distance through the material. (0 to 1, default [1.0, 1.0,
+    1.0])"""
     attenuation_distance: float | ScalarTexture
-    """How far inside light takes the attenuation colour; without it, clear. (m, 0 to 1e+09)"""
+    """How far light goes through the material until it has the attenuation colour. Without it, the inside is clear.
+    (m, 0 to 1e+09)"""
     thin_walled: bool
-    """A sheet without an inside, as a window pane or a leaf: light goes straight through. (default False)"""
+    """A sheet without an inside, such as a window pane or a leaf: light goes straight through. (default False)"""
     diffuse_transmission: float | ScalarTexture
-    """Share of the diffuse light that leaves on the other side, as of leaves and paper; above 0 a thin wall. (0 to 1,
-    default 0.0)"""
+    """How much light shines through to the other side, as through leaves and paper. Above 0 the thing is a thin
+    sheet. (0 to 1, default 0.0)"""
     diffuse_transmission_color: list[float] | float | str | ColorTexture
-    """Of the diffuse light that goes through, in place of the base colour. (0 to 1)"""
+    """The colour of the light that shines through, in place of the base colour. (0 to 1)"""
     specular_color: list[float] | float | str | ColorTexture
-    """Tints the dielectric's reflection head-on; grazing stays white. (0 to 1, default [1.0, 1.0, 1.0])"""
+    """Tints the reflection where you look straight at it; the rim stays white. (0 to 1, default [1.0, 1.0, 1.0])"""
     anisotropic_rotation: float | ScalarTexture
-    """Turns the stretch of the highlight, counter-clockwise from the tangent. (degrees, default 0.0)"""
+    """Turns the direction in which the highlight is stretched, counter-clockwise. (degrees, default 0.0)"""
     sheen_color: list[float] | float | str | ColorTexture
-    """Colour of the sheen, in place of white tinted by the sheen tint. (0 to 1)"""
+    """The colour of the sheen. It takes the place of the sheen tint. (0 to 1)"""
     sheen_roughness: float | ScalarTexture
-    """How far the sheen reaches from grazing angles inwards; satin is low, wool high. (0 to 1, default 0.5)"""
+    """How far the sheen reaches inwards from the rim: satin is low, wool high. (0 to 1, default 0.5)"""
     clearcoat_roughness: float | ScalarTexture
-    """Roughness of the coat, in place of its gloss; 0 is a perfect varnish. (0 to 1)"""
+    """How rough the lacquer is: 0 is a perfect varnish. It takes the place of the gloss. (0 to 1)"""
     conductor_eta: list[float] | float
-    """The metal's index of refraction, per channel, beside its k: in place of the base colour. (1e-30 to 1e+09)"""
+    """The index of refraction as measured, for red, green and blue. With k it takes the place of the base colour.
+    (1e-30 to 1e+09)"""
     conductor_k: list[float] | float
-    """The metal's extinction coefficient, per channel, beside its index. (0 to 1e+09)"""
+    """The extinction coefficient as measured, for red, green and blue. It goes with n. (0 to 1e+09)"""
     film_thickness: float | ScalarTexture
-    """Of a thin film on the base, whose colours are those of interference: soap 200 to 800, oxides 30 to 200. (nm, 0
-    to 10000, default 0.0)"""
+    """A thin film with the colours of a soap bubble or of oil on water: soap 200 to 800, oxides of metals 30 to 200.
+    (nm, 0 to 10000, default 0.0)"""
     film_ior: float | ScalarTexture
-    """Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. (1 to 4, default 1.4)"""
+    """How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. (1 to 4, default 1.4)"""
     clearcoat_normal_map: NormalTexture
-    """The coat's own; without it the coat is smooth over whatever is under it."""
+    """Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it."""
     emission: list[float] | float | str | dict[str, Any] | ColorTexture
-    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
-    0.0, 0.0])"""
+    """The light that leaves the front side. Above 0 the thing is a lamp. (W/(m^2 sr), 0 to 1e+20, default [0.0, 0.0,
+    0.0])"""
     emission_sides: Literal["front", "both"]
-    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    """Whether only the front shines, or the back as well. (default 'front')"""
     alpha: float | ScalarTexture
-    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    """1 is solid, 0.5 a fine mesh, 0 is not there at all. (0 to 1, default 1.0)"""
     alpha_cutoff: float | ScalarTexture
-    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    """Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there. (0 to 1)"""
     normal_map: NormalTexture
-    """Bends the surface's normal without moving the surface."""
+    """Small bumps: an image that changes how the surface catches the light, but not its outline."""
     height: HeightTexture
-    """Relief: bends the normal, and moves the surface of meshes with displacement."""
+    """Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement."""
 
 
 class QuadShape(TypedDict, total=False):
@@ -818,9 +830,9 @@ class QuadShape(TypedDict, total=False):
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class RampInput(TypedDict, total=False):
@@ -837,9 +849,9 @@ class RampStop(TypedDict, total=False):
     """A colour, and where the ramp has it."""
 
     position: Required[float]
-    """Along the ramp. (0 to 1)"""
+    """Where on the ramp it lies, from 0 to 1. (0 to 1)"""
     color: Required[list[float] | float | str | dict[str, Any]]
-    """There, as a colour or a value. (0 to 1e+20)"""
+    """The colour or value there. (0 to 1e+20)"""
 
 
 class RampTexture(TypedDict, total=False):
@@ -851,15 +863,15 @@ class RampTexture(TypedDict, total=False):
 
     type: Required[Literal["ramp"]]
     input: Literal["u", "v"] | RampInput
-    """A texture coordinate, or another texture. (default 'u')"""
+    """What runs along the ramp: a texture coordinate, or another texture. (default 'u')"""
     stops: Required[list[RampStop]]
-    """Where it has which colour."""
+    """The colours along the ramp."""
     interpolation: Literal["linear", "constant", "smooth"]
     """How a colour becomes the next one. (default 'linear')"""
     scale: float
-    """Factor on the input: 2 runs through the ramp twice, where it repeats. (default 1.0)"""
+    """How often the ramp is run through: 2 runs through it twice, where it repeats. (default 1.0)"""
     offset: float
-    """Added after the scale. (default 0.0)"""
+    """Moves the colours along the ramp. (default 0.0)"""
     wrap: Literal["clamp", "repeat", "mirror"]
     """What lies beyond the ramp's ends. (default 'clamp')"""
 
@@ -873,17 +885,17 @@ class SkyEnvironment(TypedDict, total=False):
     sun_azimuth: Required[float]
     """Where the sun stands: 0 is -Z, 90 is +X. (degrees)"""
     turbidity: float
-    """Haze: 1 is pure air, 3 a clear day, 6 hazy, 10 murky. (1 to 10, default 3.0)"""
+    """How hazy the air is: 1 is pure air, 3 a clear day, 6 hazy, 10 murky. (1 to 10, default 3.0)"""
     ground_albedo: float
-    """Share of light that the ground sends back, also into the sky: 0.3 is soil and grass. (0 to 1, default 0.3)"""
+    """How bright the ground is: 0.3 is soil and grass. (0 to 1, default 0.3)"""
     sun: bool
-    """Off: the dome alone, as if the sun itself were hidden. (default True)"""
+    """Off: the sky alone, as if the sun were hidden. (default True)"""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
     scale: float
-    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    """How bright the surroundings are. Twice as much is one stop. (0 to 1e+20, default 1.0)"""
     background: bool
-    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+    """Off: it lights the scene, but the picture is transparent where it would be seen. (default True)"""
     medium: Medium
     """What fills all space outside of bodies: fog, or the sea."""
 
@@ -892,7 +904,8 @@ class SphereShape(TypedDict, total=False):
     """An exact sphere, not a mesh."""
 
     priority: int
-    """Where bodies that light passes through overlap, the highest one is there. (-100 to 100, default 0)"""
+    """Where glass, liquids and other clear bodies overlap, the one with the highest number is there. (-100 to 100,
+    default 0)"""
     medium: Medium
     """What fills it, behind a surface that transmits."""
     type: Required[Literal["sphere"]]
@@ -905,9 +918,9 @@ class SphereShape(TypedDict, total=False):
     material: Required[str]
     """The name of one of the scene's materials."""
     transform: Transform | MatrixTransform
-    """Where the shape stands; without it, as written."""
+    """Where the thing stands, how it is turned and how large it is."""
     visible_to_camera: bool
-    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+    """Off: the camera looks through it, but its light, shadow and reflections stay. (default True)"""
 
 
 class SpotLight(TypedDict, total=False):
@@ -917,13 +930,14 @@ class SpotLight(TypedDict, total=False):
     position: Required[list[float]]
     """Where the light stands. (m)"""
     direction: Required[list[float]]
-    """Where the beam points; any length."""
+    """The direction in which the beam points."""
     intensity: Required[list[float] | float | str | dict[str, Any]]
-    """Along the beam: the irradiance it gives 1 m away. (W/sr, 0 to 1e+20)"""
+    """How bright it is: the light that falls on a surface 1 m away, in the middle of the beam. (W/sr, 0 to 1e+20)"""
     inner_angle: Required[float]
-    """From the beam's axis to where the light begins to fade. (degrees, 0 to 90)"""
+    """From the middle of the beam to where the light begins to fade. (degrees, 0 to 90)"""
     outer_angle: Required[float]
-    """From the beam's axis to where nothing is left; equal to the inner: a sharp edge. (degrees, 0 to 90)"""
+    """From the middle of the beam to where nothing is left. The same as the inner angle gives a sharp edge. (degrees,
+    0 to 90)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
@@ -983,37 +997,36 @@ class Settings(TypedDict, total=False):
     height: int
     """Of the picture. (pixels, at least 1, default 512)"""
     max_samples: int
-    """Paths per pixel at which to stop; four times as many halve the noise. (1 to 1.67772e+07, default 256)"""
+    """When to stop. Four times as many samples halve the noise. (1 to 1.67772e+07, default 256)"""
     max_bounces: int
-    """Scattering events on a path: 0 shows emission only, 1 direct light, more the light between. (0 to 1024, default
-    8)"""
+    """How often light may be reflected: 0 shows lamps only, 1 direct light, more the light between things. (0 to
+    1024, default 8)"""
     time_limit: float
-    """Stops after this time; where no samples are given, nothing else stops it. (s, 0 to 1e+09)"""
+    """Stops after this time. Without a number of samples, nothing else stops it. (s, 0 to 1e+09)"""
     target_noise: float
-    """Stops when the estimated error is this share of the mean brightness; 0.01 looks clean. (0 to 1e+09)"""
+    """Stops when this little noise is left, as a share of the brightness: 0.01 looks clean. (0 to 1e+09)"""
     seed: int
-    """Another one gives another noise of the same size. (0 to 4.29497e+09, default 0)"""
+    """Another number gives other noise, of the same strength. (0 to 4.29497e+09, default 0)"""
     quality: Literal["draft", "preview", "balanced", "high", "reference"]
-    """Fills in samples, bounces and roulette where they are not given. (default 'balanced')"""
+    """Sets samples, bounces and roulette where they are not given. (default 'balanced')"""
     estimator: Literal["mis", "bsdf", "light", "uniform"]
-    """How light is looked for; mis weighs both ways (Veach), the others are for comparison. (default 'mis')"""
+    """How light is looked for. mis is the best; the others are for comparison. (default 'mis')"""
     sampler: Literal["sobol", "independent"]
-    """sobol spreads its points evenly, and so needs fewer of them. (default 'sobol')"""
+    """How samples are spread. sobol spreads them evenly, and so needs fewer of them. (default 'sobol')"""
     filter: Literal["box", "tent", "gaussian", "blackman_harris"]
-    """How far around a pixel is averaged: box .5 pixels, tent 1, gaussian 2, the last 1.5. (default
-    'blackman_harris')"""
+    """How soft the edges of pixels are: box is the sharpest, gaussian the softest. (default 'blackman_harris')"""
     roulette_depth: int
-    """Bounces before dim paths may end at random: changes noise and speed, not the mean. (0 to 1024, default 3)"""
+    """After how many bounces dim light may be given up: more speed for more noise. (0 to 1024, default 3)"""
     resolution_scale: float
-    """Factor on width and height. (0 to 1, default 1.0)"""
+    """A factor on the width and the height. (0 to 1, default 1.0)"""
     adaptive: bool
-    """More samples where there is more noise, fewer elsewhere; the samples count their mean. (default False)"""
+    """More samples where there is more noise, fewer elsewhere. (default False)"""
     clamp: float
-    """Bounds the radiance of indirect light: removes fireflies, and some light with them. (W/(m^2 sr), 0 to 1e+20)"""
+    """Limits how bright reflected light can be: removes fireflies, and some light with them. (W/(m^2 sr), 0 to
+    1e+20)"""
     caustics: Literal["light", "paths"]
-    """Traced from the lights or found by the camera's paths; left out: what errs less in the scene."""
+    """How light that glass and mirrors gather is found. Left out, the way with less noise is taken."""
     filter_glossy: float
-    """Least roughness of surfaces after a path's first scattering: blurs caustics that are noise, and biases. (0 to
-    1, default 0.0)"""
+    """Blurs reflections within reflections: less noise, but less true. (0 to 1, default 0.0)"""
     denoise: bool
-    """Filters noise out of the picture while there is much of it; what is shown is then biased. (default False)"""
+    """Filters noise out of the picture. (default False)"""

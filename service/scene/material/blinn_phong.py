@@ -15,7 +15,7 @@ def shininess(width: Width) -> Any:
     """The hint of an exponent."""
     return hint(
         "Shininess",
-        "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+        "How tight the highlight is: 10 is dull, 100 is polished, 1000 is close to a mirror.",
         group="Specular",
         highlight=(width, "specular"),
         unit="",
@@ -43,7 +43,7 @@ class BlinnPhongMaterial(Surface):
         AnyReflectance,
         hint(
             "Specular",
-            "Colour of the highlight; not normalised: a sharper one sends back less light.",
+            "The colour of the highlight. A sharper highlight sends back less light.",
             group="Specular",
             unit="",
             widget="color",
@@ -54,7 +54,7 @@ class BlinnPhongMaterial(Surface):
         AnyRadiometric,
         hint(
             "Ambient",
-            "Radiance added wherever a path meets the surface; it is never sampled as a light.",
+            "Light that is added wherever the surface is seen; it does not light other things.",
             group="Emission",
             unit="W/(m^2 sr)",
             widget="color",

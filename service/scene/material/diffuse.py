@@ -17,7 +17,8 @@ class DiffuseMaterial(Surface):
         AnyReflectance,
         hint(
             "Albedo",
-            "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
+            "The colour, as the share of light that is sent back: snow 0.9, white paint 0.8, grass 0.25, "
+            "charcoal 0.04.",
             group="Base",
             unit="",
             widget="color",

@@ -19,7 +19,7 @@ class DisneyMaterial(Surface):
         AnyFraction,
         hint(
             "Subsurface",
-            "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
+            "A flatter, softer shade, as of skin or wax.",
             group="Subsurface",
             unit="",
             widget="slider",
@@ -30,7 +30,7 @@ class DisneyMaterial(Surface):
         AnyFraction,
         hint(
             "Specular",
-            "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
+            "How much the surface mirrors where you look straight at it: 0.5 is 4 %, as of plastic and glass.",
             group="Specular",
             unit="",
             widget="slider",
@@ -40,7 +40,7 @@ class DisneyMaterial(Surface):
         AnyFraction,
         hint(
             "Specular tint",
-            "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
+            "Tints the reflection with the base colour where you look straight at it; the rim stays white.",
             group="Specular",
             unit="",
             widget="slider",
@@ -51,7 +51,7 @@ class DisneyMaterial(Surface):
         AnyFraction,
         hint(
             "Anisotropic",
-            "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
+            "Stretches the highlight, as on brushed metal: at 1 it is ten times as long as wide.",
             group="Specular",
             unit="",
             widget="slider",
@@ -59,17 +59,24 @@ class DisneyMaterial(Surface):
     ] = 0.0
     sheen: Annotated[
         AnyFraction,
-        hint("Sheen", "Extra light at grazing angles, for cloth.", group="Sheen", unit="", widget="slider"),
+        hint("Sheen", "A soft bright rim, as of cloth.", group="Sheen", unit="", widget="slider"),
     ] = 0.0
     sheen_tint: Annotated[
         AnyFraction,
-        hint("Sheen tint", "Tints the sheen from white to the base colour.", group="Sheen", unit="", widget="slider"),
+        hint(
+            "Sheen tint",
+            "Tints the sheen from white towards the base colour.",
+            group="Sheen",
+            unit="",
+            widget="slider",
+            unless="sheen_color",  # of the model that extends this one
+        ),
     ] = 0.5
     clearcoat: Annotated[
         AnyFraction,
         hint(
             "Clearcoat",
-            "A second, thin layer of lacquer with an index of 1.5.",
+            "A thin layer of clear lacquer on top.",
             group="Coat",
             unit="",
             widget="slider",
@@ -77,5 +84,12 @@ class DisneyMaterial(Surface):
     ] = 0.0
     clearcoat_gloss: Annotated[
         AnyFraction,
-        hint("Clearcoat gloss", "1 is a gloss lacquer, 0 a satin one.", group="Coat", unit="", widget="slider"),
+        hint(
+            "Clearcoat gloss",
+            "1 is a glossy lacquer, 0 a satin one.",
+            group="Coat",
+            unit="",
+            widget="slider",
+            unless="clearcoat_roughness",
+        ),
     ] = 1.0

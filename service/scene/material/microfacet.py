@@ -53,13 +53,13 @@ class MicrofacetMaterial(SolidSurface):
     type: Literal["microfacet"]
     distribution: Annotated[
         Distribution,
-        hint("Distribution", "How the normals of the microfacets are spread: D, normalised.", group="Specular"),
+        hint("Distribution", "How the tiny facets of the surface are tilted (D).", group="Specular"),
     ] = "ggx"
     alpha: Annotated[
         AnyAlpha,
         hint(
             "Alpha",
-            "The distribution's parameter: a width; for phong an exponent, for abc an inverse width.",
+            "How wide the highlight is; for Phong an exponent, for ABC an inverse width.",
             group="Specular",
             highlight=("alpha", "f0"),
             unit="",
@@ -72,7 +72,7 @@ class MicrofacetMaterial(SolidSurface):
         Annotated[float, Field(ge=ANY_GAMMA[0], le=ANY_GAMMA[1])],
         hint(
             "Gamma",
-            "How soon the tail falls off, for gtr, abc and sgd; the others do not use it.",
+            "How soon the highlight fades towards its rim.",
             group="Specular",
             unit="",
             widget="slider",
@@ -83,16 +83,14 @@ class MicrofacetMaterial(SolidSurface):
     ] = 2.0
     geometry: Annotated[
         Geometry,
-        hint("Geometry", "The share of the microfacets that is neither masked nor shadowed: G.", group="Specular"),
+        hint("Geometry", "How the tiny facets hide each other (G).", group="Specular"),
     ] = "smith"
-    fresnel: Annotated[Fresnel, hint("Fresnel", "The reflectance of one microfacet: F.", group="Specular")] = (
-        "schlick"
-    )
+    fresnel: Annotated[Fresnel, hint("Fresnel", "How one facet mirrors (F).", group="Specular")] = "schlick"
     f0: Annotated[
         AnyReflectance,
         hint(
             "F0",
-            "Reflectance head-on, for schlick and cook_torrance.",
+            "How much is mirrored where you look straight at it.",
             group="Specular",
             unit="",
             widget="color",
@@ -103,7 +101,7 @@ class MicrofacetMaterial(SolidSurface):
         RefractiveIndex,
         hint(
             "Index of refraction",
-            "For dielectric: water 1.33, glass 1.5, diamond 2.42.",
+            "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42.",
             group="Specular",
             unit="",
             widget="slider",
@@ -114,8 +112,8 @@ class MicrofacetMaterial(SolidSurface):
         ConductorIndex | None,
         OMITTABLE,
         hint(
-            "Conductor's index",
-            "For conductor: its index of refraction, per channel.",
+            "n (measured metal)",
+            "The index of refraction as measured, for red, green and blue.",
             group="Specular",
             unit="",
             widget="number",
@@ -127,8 +125,8 @@ class MicrofacetMaterial(SolidSurface):
         Extinction | None,
         OMITTABLE,
         hint(
-            "Conductor's k",
-            "For conductor: its extinction coefficient, per channel.",
+            "k (measured metal)",
+            "The extinction coefficient as measured, for red, green and blue.",
             group="Specular",
             unit="",
             widget="number",
@@ -140,20 +138,20 @@ class MicrofacetMaterial(SolidSurface):
         AnyReflectance,
         hint(
             "Diffuse",
-            "Albedo of the diffuse lobe, which is added to the facets.",
+            "The colour of the matte part, which is added to the highlight.",
             group="Base",
             unit="",
             widget="color",
         ),
     ] = (0.0, 0.0, 0.0)
-    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "The shape of the diffuse lobe.", group="Base")] = (
+    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "How the matte part is shaded.", group="Base")] = (
         "lambert"
     )
     diffuse_roughness: Annotated[
         Fraction,
         hint(
             "Diffuse roughness",
-            "Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it.",
+            "How flat the matte part looks, as clay or plaster do.",
             group="Base",
             unit="",
             widget="slider",

@@ -38,13 +38,13 @@ class OpenpbrMaterial(AnySurface):
     type: Literal["openpbr"]
     base_weight: Annotated[
         AnyFraction,
-        hint("Base weight", "A factor on the base colour.", group="Base", unit="", widget="slider"),
+        hint("Base weight", "How strong the base colour is.", group="Base", unit="", widget="slider"),
     ] = 1.0
     base_color: Annotated[
         AnyReflectance,
         hint(
             "Base colour",
-            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+            "The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9.",
             group="Base",
             unit="",
             widget="color",
@@ -54,7 +54,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Diffuse roughness",
-            "0 is Lambert's; above it flatter, as of clay or plaster.",
+            "0 is smooth; above it the surface looks flatter, as clay or plaster do.",
             group="Base",
             unit="",
             widget="slider",
@@ -64,7 +64,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Metalness",
-            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+            "0 is no metal, 1 is metal. Values between are for dust, rust or blends.",
             known_as="metallic",
             group="Base",
             unit="",
@@ -75,7 +75,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFactor,
         hint(
             "Specular weight",
-            "A factor on what a dielectric reflects head-on, or a metal at all; none reflects more than all.",
+            "How strongly the surface mirrors.",
             group="Specular",
             unit="",
             widget="slider",
@@ -86,7 +86,7 @@ class OpenpbrMaterial(AnySurface):
         AnyReflectance,
         hint(
             "Specular colour",
-            "Tints a dielectric's reflection, or a metal's near grazing angles.",
+            "Tints the reflection; of a metal, only its rim.",
             group="Specular",
             unit="",
             widget="color",
@@ -96,7 +96,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Roughness",
-            "0 is polished, 1 is matte; its square is the width of the highlight.",
+            "0 is polished, 1 is matte.",
             known_as="roughness",
             group="Specular",
             highlight=("roughness", None),
@@ -108,7 +108,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Anisotropy",
-            "Stretches the highlight along the tangent, as of brushed metal; above 0.9 is as 0.9.",
+            "Stretches the highlight, as on brushed metal; above 0.9 nothing changes any more.",
             known_as="anisotropic",
             group="Specular",
             unit="",
@@ -119,7 +119,7 @@ class OpenpbrMaterial(AnySurface):
         AnyPositiveIndex,
         hint(
             "Index of refraction",
-            "Water 1.33, glass 1.5, diamond 2.42; below 1 the outer side is the denser one. A texture gives 1 to 4.",
+            "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. A texture gives 1 to 4.",
             known_as="ior",
             group="Specular",
             unit="",
@@ -131,7 +131,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Transmission",
-            "Share of the dielectric that is clear: 1 is solid glass, entered and left by refraction.",
+            "How clear the material is: 1 is glass.",
             known_as="transmission",
             group="Transmission",
             unit="",
@@ -142,7 +142,7 @@ class OpenpbrMaterial(AnySurface):
         AnyReflectance,
         hint(
             "Transmission colour",
-            "Tints light that passes the surface, or by the transmission depth the inside.",
+            "The colour of light that has gone through the material.",
             group="Transmission",
             unit="",
             widget="color",
@@ -154,14 +154,15 @@ class OpenpbrMaterial(AnySurface):
     transmission_dispersion_scale: Annotated[
         Fraction,
         hint(
-            "Dispersion", "How much of the dispersion that the Abbe number stands for; 0 is none.",
+            "Dispersion", "How much light is split into colours, as by a prism: 0 is not at all.",
             group="Transmission", unit="", widget="slider",
         ),
     ] = 0.0  # fmt: skip
     transmission_dispersion_abbe_number: Annotated[
         Abbe,
         hint(
-            "Abbe number", "How little refracted light spreads into colours: flint 30, diamond 55, crown 60.",
+            "Abbe number",
+            "Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60.",
             group="Transmission", unit="", widget="slider", soft=(9, 91),
         ),
     ] = 20.0  # fmt: skip
@@ -174,7 +175,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Coat",
-            "How much of the surface a clear coat covers.",
+            "How much of the surface is covered by clear lacquer.",
             known_as="clearcoat",
             group="Coat",
             unit="",
@@ -185,7 +186,7 @@ class OpenpbrMaterial(AnySurface):
         AnyReflectance,
         hint(
             "Coat colour",
-            "What is left of white light that passes the coat twice, straight.",
+            "The tint of the lacquer.",
             group="Coat",
             unit="",
             widget="color",
@@ -195,7 +196,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Coat roughness",
-            "Of the coat's own highlight; it makes those below rougher, too.",
+            "How rough the lacquer is: 0 is a perfect varnish.",
             known_as="clearcoat_roughness",
             group="Coat",
             unit="",
@@ -206,7 +207,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Coat anisotropy",
-            "Stretches the coat's highlight along the coat's tangent.",
+            "Stretches the highlight of the lacquer.",
             group="Coat",
             unit="",
             widget="slider",
@@ -215,14 +216,14 @@ class OpenpbrMaterial(AnySurface):
     coat_ior: Annotated[
         AnyPositiveIndex,
         hint(
-            "Coat index", "Of the coat's refraction; lacquer is 1.5 to 1.6.",
+            "Coat index", "How strongly the lacquer bends and mirrors light: 1.5 to 1.6.",
             group="Coat", unit="", widget="slider", soft=(1, 3),
         ),
     ] = 1.6  # fmt: skip
     coat_darkening: Annotated[
         AnyFraction,
         hint(
-            "Coat darkening", "How much reflections inside the coat darken what lies under it; 1 is what they do.",
+            "Coat darkening", "How much the lacquer deepens the colours under it, as varnish does wood.",
             group="Coat", unit="", widget="slider",
         ),
     ] = 1.0  # fmt: skip
@@ -230,7 +231,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Fuzz",
-            "How much of the surface fibres or dust cover.",
+            "How much of the surface is covered by fibres or dust.",
             known_as="sheen",
             group="Sheen",
             unit="",
@@ -241,7 +242,7 @@ class OpenpbrMaterial(AnySurface):
         AnyReflectance,
         hint(
             "Fuzz colour",
-            "Of the light that the fuzz reflects.",
+            "The colour of the fibres or the dust.",
             known_as="sheen_color",
             group="Sheen",
             unit="",
@@ -252,7 +253,7 @@ class OpenpbrMaterial(AnySurface):
         AnyFraction,
         hint(
             "Fuzz roughness",
-            "How far it reaches from grazing angles inwards; cloth is low, dust high.",
+            "How far the fuzz reaches inwards from the rim: cloth is low, dust high.",
             known_as="sheen_roughness",
             group="Sheen",
             unit="",
@@ -266,7 +267,7 @@ class OpenpbrMaterial(AnySurface):
         Luminance,
         hint(
             "Emission",
-            "Luminance that leaves the front side, times the colour: above 0 the shape is an area light.",
+            "The light that leaves the front side. Above 0 the thing is a lamp.",
             group="Emission",
             unit="cd/m^2",
             widget="slider",
@@ -275,14 +276,14 @@ class OpenpbrMaterial(AnySurface):
     ] = 0.0
     emission_color: Annotated[
         AnyRadiometric,
-        hint("Emission colour", "A factor on the emission.", group="Emission", unit="", widget="color", soft=1),
+        hint("Emission colour", "The colour of the light.", group="Emission", unit="", widget="color", soft=1),
     ] = (1.0, 1.0, 1.0)
     emission_sides: EmissionSides = "front"
     geometry_opacity: Annotated[
         AnyFraction,
         hint(
             "Opacity",
-            "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            "1 is solid, 0.5 a fine mesh, 0 is not there at all.",
             known_as="alpha",
             group="Geometry",
             unit="",
@@ -292,7 +293,7 @@ class OpenpbrMaterial(AnySurface):
     geometry_thin_walled: Annotated[
         bool,
         hint(
-            "Thin walled", "A sheet without an inside: light goes straight through.",
+            "Thin walled", "A sheet without an inside, such as a window pane: light goes straight through.",
             known_as="thin_walled", group="Geometry",
         ),
     ] = False  # fmt: skip
@@ -301,7 +302,7 @@ class OpenpbrMaterial(AnySurface):
         OMITTABLE,
         hint(
             "Normal map",
-            "Bends the surface's normal without moving the surface.",
+            "Small bumps: an image that changes how the surface catches the light, but not its outline.",
             known_as="normal_map",
             group="Geometry",
         ),
@@ -311,7 +312,7 @@ class OpenpbrMaterial(AnySurface):
         OMITTABLE,
         hint(
             "Tangent",
-            "Where anisotropy stretches highlights: x along growing u, y along growing v.",
+            "The direction in which highlights are stretched, along the texture coordinates u and v.",
             group="Geometry",
             unit="",
             widget="number",
@@ -323,7 +324,7 @@ class OpenpbrMaterial(AnySurface):
         OMITTABLE,
         hint(
             "Coat normal map",
-            "The coat's own; without it the coat is smooth over whatever is under it.",
+            "Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it.",
             known_as="clearcoat_normal_map",
             group="Coat",
         ),
@@ -332,7 +333,7 @@ class OpenpbrMaterial(AnySurface):
         Tangent | None,
         OMITTABLE,
         hint(
-            "Coat tangent", "Where the coat's anisotropy stretches its highlights.",
+            "Coat tangent", "The direction in which the highlights of the lacquer are stretched.",
             group="Coat", unit="", widget="number", absent="along u",
         ),
     ] = None  # fmt: skip

@@ -20,7 +20,7 @@ FilmWeight = Annotated[
     AnyFraction,
     hint(
         "Thin film",
-        "How much of the base a thin film covers, whose colours are those of interference.",
+        "How much of the surface has a thin film, with the colours of a soap bubble.",
         group="Film",
         unit="",
         widget="slider",
@@ -41,7 +41,8 @@ FilmIndex = Annotated[
     AnyPositiveIndex,
     hint(
         "Film index",
-        "Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6; below 1 it is taken as 1. A texture gives 1 to 4.",
+        "How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. A texture gives 1 "
+        "to 4.",
         known_as="film_ior",
         group="Film",
         unit="",

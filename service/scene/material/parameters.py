@@ -11,7 +11,7 @@ BaseColor = Annotated[
     AnyReflectance,
     hint(
         "Base colour",
-        "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+        "The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9.",
         group="Base",
         unit="",
         widget="color",
@@ -21,7 +21,7 @@ Metallic = Annotated[
     AnyFraction,
     hint(
         "Metallic",
-        "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+        "0 is no metal, 1 is metal. Values between are for dust, rust or blends.",
         group="Base",
         unit="",
         widget="slider",
@@ -31,7 +31,7 @@ Roughness = Annotated[
     AnyFraction,
     hint(
         "Roughness",
-        "0 is polished, 1 is matte; its square is the width of the highlight.",
+        "0 is polished, 1 is matte.",
         group="Base",
         highlight=("roughness", None),
         unit="",

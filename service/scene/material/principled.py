@@ -55,7 +55,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyFraction,
         hint(
             "Transmission",
-            "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
+            "How clear the material is: 1 is glass.",
             group="Transmission",
             unit="",
             widget="slider",
@@ -66,7 +66,8 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Index of refraction",
-            "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise.",
+            "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. It takes the place of "
+            "specular.",
             group="Specular",
             unit="",
             widget="slider",
@@ -78,7 +79,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Abbe number",
-            "Spreads what glass refracts into colours: flint 30, diamond 55, crown 60; without it, none.",
+            "Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60.",
             group="Transmission",
             unit="",
             widget="slider",
@@ -90,7 +91,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyReflectance,
         hint(
             "Attenuation colour",
-            "What is left of white light after the attenuation distance inside.",
+            "The colour of white light after the attenuation distance through the material.",
             group="Transmission",
             unit="",
             widget="color",
@@ -101,7 +102,8 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Attenuation distance",
-            "How far inside light takes the attenuation colour; without it, clear.",
+            "How far light goes through the material until it has the attenuation colour. Without it, the inside "
+            "is clear.",
             group="Transmission",
             unit="m",
             widget="slider",
@@ -114,7 +116,7 @@ class PrincipledMaterial(DisneyMaterial):
         bool,
         hint(
             "Thin walled",
-            "A sheet without an inside, as a window pane or a leaf: light goes straight through.",
+            "A sheet without an inside, such as a window pane or a leaf: light goes straight through.",
             group="Transmission",
         ),
     ] = False
@@ -122,7 +124,8 @@ class PrincipledMaterial(DisneyMaterial):
         AnyFraction,
         hint(
             "Diffuse transmission",
-            "Share of the diffuse light that leaves on the other side, as of leaves and paper; above 0 a thin wall.",
+            "How much light shines through to the other side, as through leaves and paper. Above 0 the thing is "
+            "a thin sheet.",
             group="Transmission",
             unit="",
             widget="slider",
@@ -133,7 +136,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Diffuse transmission colour",
-            "Of the diffuse light that goes through, in place of the base colour.",
+            "The colour of the light that shines through, in place of the base colour.",
             group="Transmission",
             unit="",
             widget="color",
@@ -144,7 +147,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyReflectance,
         hint(
             "Specular colour",
-            "Tints the dielectric's reflection head-on; grazing stays white.",
+            "Tints the reflection where you look straight at it; the rim stays white.",
             group="Specular",
             unit="",
             widget="color",
@@ -154,7 +157,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyDegrees,
         hint(
             "Anisotropic rotation",
-            "Turns the stretch of the highlight, counter-clockwise from the tangent.",
+            "Turns the direction in which the highlight is stretched, counter-clockwise.",
             group="Specular",
             unit="degrees",
             widget="angle",
@@ -166,7 +169,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Sheen colour",
-            "Colour of the sheen, in place of white tinted by the sheen tint.",
+            "The colour of the sheen. It takes the place of the sheen tint.",
             group="Sheen",
             unit="",
             widget="color",
@@ -177,7 +180,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyFraction,
         hint(
             "Sheen roughness",
-            "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
+            "How far the sheen reaches inwards from the rim: satin is low, wool high.",
             group="Sheen",
             unit="",
             widget="slider",
@@ -188,7 +191,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Clearcoat roughness",
-            "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
+            "How rough the lacquer is: 0 is a perfect varnish. It takes the place of the gloss.",
             group="Coat",
             unit="",
             widget="slider",
@@ -199,8 +202,9 @@ class PrincipledMaterial(DisneyMaterial):
         ConductorIndex | None,
         OMITTABLE,
         hint(
-            "Metal's index",
-            "The metal's index of refraction, per channel, beside its k: in place of the base colour.",
+            "n (measured metal)",
+            "The index of refraction as measured, for red, green and blue. With k it takes the place of the base "
+            "colour.",
             group="Specular",
             unit="",
             widget="number",
@@ -213,8 +217,8 @@ class PrincipledMaterial(DisneyMaterial):
         Extinction | None,
         OMITTABLE,
         hint(
-            "Metal's k",
-            "The metal's extinction coefficient, per channel, beside its index.",
+            "k (measured metal)",
+            "The extinction coefficient as measured, for red, green and blue. It goes with n.",
             group="Specular",
             unit="",
             widget="number",
@@ -227,7 +231,8 @@ class PrincipledMaterial(DisneyMaterial):
         AnyThickness,
         hint(
             "Film thickness",
-            "Of a thin film on the base, whose colours are those of interference: soap 200 to 800, oxides 30 to 200.",
+            "A thin film with the colours of a soap bubble or of oil on water: soap 200 to 800, oxides of metals "
+            "30 to 200.",
             group="Film",
             unit="nm",
             widget="slider",
@@ -238,7 +243,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyIndex,
         hint(
             "Film index",
-            "Water 1.33, oil 1.47, oxides of metals 1.8 to 2.6.",
+            "How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6.",
             group="Film",
             unit="",
             widget="slider",
@@ -250,7 +255,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Coat normal map",
-            "The coat's own; without it the coat is smooth over whatever is under it.",
+            "Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it.",
             group="Coat",
         ),
     ] = None

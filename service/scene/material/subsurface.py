@@ -32,7 +32,8 @@ Depth = Annotated[
     Length,
     hint(
         "Transmission depth",
-        "How far inside light takes the transmission colour; 0: it is tinted where it passes the surface.",
+        "How far light goes through the material until it has the transmission colour. 0: it is tinted at the "
+        "surface.",
         group="Transmission",
         unit="m",
         widget="slider",
@@ -44,7 +45,7 @@ Scatter = Annotated[
     Reflectance,
     hint(
         "Transmission scatter",
-        "How much of the light turns inside, over the transmission depth.",
+        "How milky the inside is.",
         group="Transmission",
         unit="",
         widget="color",
@@ -54,7 +55,7 @@ ScatterAnisotropy = Annotated[
     _Anisotropy,
     hint(
         "Scatter anisotropy",
-        "The mean cosine of a turn inside: above 0 light goes on, below 0 it comes back.",
+        "Where light goes when it is scattered: above 0 onwards, below 0 back.",
         group="Transmission",
         unit="",
         widget="slider",
@@ -64,7 +65,7 @@ Weight = Annotated[
     AnyFraction,
     hint(
         "Subsurface",
-        "Share of the diffuse light that walks below the surface, as in skin, wax or milk.",
+        "How much of the light wanders below the surface, as in skin, wax or milk.",
         known_as="subsurface",
         group="Subsurface",
         unit="",
@@ -73,7 +74,9 @@ Weight = Annotated[
 ]
 Color = Annotated[
     AnyReflectance,
-    hint("Subsurface colour", "What much of it shows head-on.", group="Subsurface", unit="", widget="color"),
+    hint(
+        "Subsurface colour", "The colour that a thick piece of it has.", group="Subsurface", unit="", widget="color"
+    ),
 ]
 Radius = Annotated[
     Length,
@@ -95,7 +98,7 @@ Anisotropy = Annotated[
     _Anisotropy,
     hint(
         "Subsurface anisotropy",
-        "The mean cosine of a turn: above 0 light goes on, below 0 it comes back.",
+        "Where light goes when it is scattered: above 0 onwards, below 0 back.",
         group="Subsurface",
         unit="",
         widget="slider",

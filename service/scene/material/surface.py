@@ -11,7 +11,7 @@ Emission = Annotated[
     AnyRadiance,
     hint(
         "Emission",
-        "Radiance that leaves the front side: above 0 the shape is an area light.",
+        "The light that leaves the front side. Above 0 the thing is a lamp.",
         group="Emission",
         unit="W/(m^2 sr)",
         widget="color",
@@ -22,19 +22,27 @@ EmissionSides = Annotated[
     Literal["front", "both"],
     hint(
         "Emitting sides",
-        "Whether the emission leaves the outward side only, or the inward side as well.",
+        "Whether only the front shines, or the back as well.",
         group="Emission",
     ),
 ]
 NormalMap = Annotated[
     NormalTexture | None,
     OMITTABLE,
-    hint("Normal map", "Bends the surface's normal without moving the surface.", group="Geometry"),
+    hint(
+        "Normal map",
+        "Small bumps: an image that changes how the surface catches the light, but not its outline.",
+        group="Geometry",
+    ),
 ]
 Height = Annotated[
     HeightTexture | None,
     OMITTABLE,
-    hint("Height", "Relief: bends the normal, and moves the surface of meshes with displacement.", group="Geometry"),
+    hint(
+        "Height",
+        "Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement.",
+        group="Geometry",
+    ),
 ]
 
 
@@ -94,7 +102,7 @@ class Surface(AnySurface):
         AnyFraction,
         hint(
             "Alpha",
-            "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            "1 is solid, 0.5 a fine mesh, 0 is not there at all.",
             group="Geometry",
             unit="",
             widget="slider",
@@ -105,7 +113,7 @@ class Surface(AnySurface):
         OMITTABLE,
         hint(
             "Alpha cutoff",
-            "Where given, an alpha of at least this counts as 1, any other as 0.",
+            "Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there.",
             group="Geometry",
             unit="",
             widget="slider",
