@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from service import images
 from service.assets.rendered import rendered
@@ -30,6 +30,7 @@ from service.system.executors import comparing, opening, packing, storing
 from service.verdict import comparison
 from service.verdict.comparison import Side, Source, Still, Taken, Verdict, ways_of
 from service.verdict.evidence import PIXEL_BYTES, Estimate
+from service.verdict.under_way import UnderWay
 from service.views import MapKind
 
 router = APIRouter(prefix="/v1", tags=["compare"])
@@ -43,7 +44,11 @@ VERDICT: answers.Responses = {
 }
 
 ASSET = "sha256:"
+under_way = UnderWay()  # of this process, which is the only one that answers
 HEADER_REGIONS = 16  # in the header beside a map, which proxies bound to 8 KiB
+
+
+Name = Annotated[str, Field(pattern=r"^[\w-]{1,64}$")]
 
 
 class CompareQuery(BaseModel):
@@ -52,6 +57,21 @@ class CompareQuery(BaseModel):
     model_config = ConfigDict(extra="forbid")
     format: Literal["json", "png"] = "json"
     map: MapKind = "p"
+    name: Name | None = None  # by which its client asks how far it is
+
+
+@router.get(
+    "/compare/{name}",
+    summary="Say how far a comparison is",
+    description="Of one that was given that `name` by whoever asked for it; 204 while none of it is under way.",
+    response_model=compare_answers.UnderWay,
+    responses={204: {"description": "It has not begun, or has ended."}},
+)
+async def comparison_under_way(request: Request, name: Name) -> Response:
+    found = under_way.samples(owner_of(request), name)
+    if found is None:
+        return Response(status_code=204)
+    return JSONResponse({"samples": found[0], "max_samples": found[1]})
 
 
 @router.post(
@@ -83,7 +103,11 @@ async def _answered(
     state: AppState, asked: ParsedComparison, caller: str, owner: str, query: CompareQuery
 ) -> Response:
     """Encoded where cancelling it ends the work as well."""
-    with state.memory.growing("scenes") as hold_scenes, state.memory.growing("pictures") as hold_pictures:
+    with (
+        state.memory.growing("scenes") as hold_scenes,
+        state.memory.growing("pictures") as hold_pictures,
+        under_way.told(owner, query.name) as told,
+    ):
         sides = _Sides(state, caller, owner, hold_scenes)
         a, b = await sides.found(asked.a, "/a"), await sides.found(asked.b, "/b")
         check_sizes(a.size, b.size)
@@ -91,7 +115,7 @@ async def _answered(
         if asked.same and isinstance(a, Source):
             verdict = comparison.same(a, asked.confidence)
         else:
-            verdict = await comparison.compare(a, b, asked.confidence)
+            verdict = await comparison.compare(a, b, asked.confidence, told)
         return await comparing(partial(_response, verdict, query))
 
 

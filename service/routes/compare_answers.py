@@ -17,6 +17,16 @@ class Region(BaseModel):
     p_value: float
 
 
+class Differing(BaseModel):
+    share: float = Field(description="Of the pixels, those that are known to differ: 0 to 1.")
+    difference: float = Field(description="The mean of their differences as displayed, noise included: 0 to 1.")
+
+
+class UnderWay(BaseModel):
+    samples: int = Field(description="Of each pixel, that are taken.")
+    max_samples: int = Field(description="That are taken at most: fewer, once they are known to differ.")
+
+
 class SamplesTaken(BaseModel):
     a: int
     b: int
@@ -33,6 +43,7 @@ class Verdict(BaseModel):
     psnr: float | None = Field(description="dB, of sRGB as displayed over black; null where the pictures are equal.")
     flip: float = Field(description="Mean LDR-FLIP at 67 pixels a degree, as displayed: 0 to 1.")
     ssim: float = Field(description="Mean SSIM of grey as displayed; 1 where the pictures are equal.")
+    differing: Differing
     samples: SamplesTaken = Field(
         description="Of each pixel, when the verdict was known; 0 where both are one document, which needs none."
     )

@@ -16,7 +16,7 @@ from service.quality import ResolvedSettings
 from service.system.executors import comparing
 from service.verdict.decision import Decision, decide
 from service.verdict.evidence import Array, Estimate, Evidence, Sum
-from service.verdict.figures import Figures, figures
+from service.verdict.figures import Differing, Figures, differing, figures
 from service.verdict.maps import drawn
 from service.verdict.regions import Region, p_map, regions
 from service.verdict.schedule import USUAL_SAMPLES, Schedule, of_one_document, of_two_documents
@@ -74,6 +74,8 @@ class Source:
 
 
 Side = Still | Source
+# Called with the samples of each pixel that are taken, and those that may be taken at most.
+Told = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ class Verdict:
     different: bool
     p_value: float
     figures: Figures
+    differing: Differing
     regions: list[Region]
     samples: tuple[int, int]  # of a and b
     p: Array  # a `p_map`
@@ -94,6 +97,7 @@ class Verdict:
             "different": self.different,
             "p_value": self.p_value,
             **asdict(self.figures),
+            "differing": asdict(self.differing),
             "samples": {"a": self.samples[0], "b": self.samples[1]},
             "regions": [asdict(region) for region in self.regions],
         }
@@ -103,15 +107,15 @@ class Verdict:
         return drawn(kind, self.a, self.b, self.p, self.alpha)
 
 
-async def compare(a: Side, b: Side, confidence: float) -> Verdict:
+async def compare(a: Side, b: Side, confidence: float, told: Told = lambda taken, most: None) -> Verdict:
     """The verdict on two sides of the same size. Cancelled, it ends what it renders."""
     alpha = 1.0 - confidence
     if isinstance(a, Source) and isinstance(b, Source):
-        evidence, decision = await _of_two_documents(a, b, alpha)
+        evidence, decision = await _of_two_documents(a, b, alpha, told)
     elif isinstance(a, Source) and isinstance(b, Still):
-        evidence, decision = await _of_one_document(a, b, "a", alpha)
+        evidence, decision = await _of_one_document(a, b, "a", alpha, told)
     elif isinstance(a, Still) and isinstance(b, Source):
-        evidence, decision = await _of_one_document(b, a, "b", alpha)
+        evidence, decision = await _of_one_document(b, a, "b", alpha, told)
     else:
         assert isinstance(a, Still) and isinstance(b, Still)
         evidence = await comparing(partial(Evidence, a.estimate, b.estimate, a.ways == b.ways))
@@ -124,7 +128,18 @@ def same(source: Source, confidence: float) -> Verdict:
     width, height = source.size
     nothing = np.zeros((height, width, 3))
     equal = Figures(mean_difference=0.0, rmse=0.0, psnr=None, flip=0.0, ssim=1.0)
-    return Verdict(False, 1.0, equal, [], (0, 0), np.ones((height, width)), nothing, nothing, 1.0 - confidence)
+    return Verdict(
+        False,
+        1.0,
+        equal,
+        Differing(0.0, 0.0),
+        [],
+        (0, 0),
+        np.ones((height, width)),
+        nothing,
+        nothing,
+        1.0 - confidence,
+    )
 
 
 class _Limits:
@@ -154,10 +169,11 @@ class _Limits:
         return self._left_s <= 0 or quiet
 
 
-async def _of_two_documents(a: Source, b: Source, alpha: float) -> tuple[Evidence, Decision]:
+async def _of_two_documents(a: Source, b: Source, alpha: float, told: Told) -> tuple[Evidence, Decision]:
     schedule, limits = of_two_documents(min(a.samples, b.samples), a.settings.seed), _Limits(a, b)
     evidence, best = None, Decision()
-    for group in schedule.groups:
+    for done, group in enumerate(schedule.groups):
+        told(*schedule.share(done))
         settings = (limits.settings(each.settings, group.seed, group.samples) for each in (a, b))
         first, second = await _together(*(each.render(own) for each, own in zip((a, b), settings, strict=True)))
         limits.spend(max(first.elapsed_s, second.elapsed_s))
@@ -174,11 +190,14 @@ async def _of_two_documents(a: Source, b: Source, alpha: float) -> tuple[Evidenc
     return evidence, best
 
 
-async def _of_one_document(source: Source, still: Still, side: str, alpha: float) -> tuple[Evidence, Decision]:
+async def _of_one_document(
+    source: Source, still: Still, side: str, alpha: float, told: Told
+) -> tuple[Evidence, Decision]:
     known = still.estimate.samples
     schedule, limits = of_one_document(source.samples, known, still.seed), _Limits(source)
     evidence, best = None, Decision()
-    for group in schedule.groups:
+    for done, group in enumerate(schedule.groups):
+        told(*schedule.share(done))
         taken = await source.render(limits.settings(source.settings, group.seed, group.samples))
         limits.spend(taken.elapsed_s)
         if evidence is None:
@@ -224,6 +243,6 @@ def _verdict(evidence: Evidence, decision: Decision, alpha: float) -> Verdict:
     different = decision.p_value < alpha
     p = p_map(decision.levels, evidence.shape, alpha)
     return Verdict(
-        different, decision.p_value, figures(a, b), regions(p, alpha) if different else [],
+        different, decision.p_value, figures(a, b), differing(a, b, p, alpha), regions(p, alpha) if different else [],
         (evidence.a.samples, evidence.b.samples), p, a, b, alpha,
     )  # fmt: skip

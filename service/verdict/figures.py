@@ -25,6 +25,14 @@ class Figures:
     ssim: float
 
 
+@dataclass(frozen=True)
+class Differing:
+    """The pixels that are known to differ."""
+
+    share: float  # of all pixels
+    difference: float  # the mean of theirs, of 0 to 1 as displayed, whatever its sign
+
+
 def displayed(radiance: Array) -> Array:
     """(height, width, 3) of 0 to 1: sRGB as the default view shows it, over black."""
     return encode_srgb(np.clip(pbr_neutral(np.minimum(radiance, 1e37)), 0.0, 1.0))
@@ -61,6 +69,13 @@ def figures(a: Array, b: Array) -> Figures:
 def flip_map(shown_a: Array, shown_b: Array) -> Array:
     """(height, width) of 0 to 1, of what `displayed` gives."""
     return flip(decode_srgb(shown_a), decode_srgb(shown_b))
+
+
+def differing(a: Array, b: Array, p: Array, alpha: float) -> Differing:
+    """Of two pictures' mean radiance and their `p_map`."""
+    known = p < alpha
+    apart = np.abs(displayed(b) - displayed(a)).mean(axis=-1)
+    return Differing(float(known.mean()), float(apart[known].mean()) if known.any() else 0.0)
 
 
 def ssim(a: Array, b: Array) -> float:

@@ -28,6 +28,11 @@ class Schedule:
     def looks(self) -> int:
         return sum(group.look for group in self.groups)
 
+    def share(self, done: int) -> tuple[int, int]:
+        """The samples of so many groups, and those of all."""
+        samples = [group.samples for group in self.groups]
+        return sum(samples[:done]), sum(samples)
+
 
 def of_two_documents(samples: int, seed: int) -> Schedule:
     """Equal groups for both sides, each with a seed of its own; looked at after 1, 2, 4 ... groups."""

@@ -6,6 +6,7 @@ import asyncio
 import copy
 import io
 import json
+from concurrent.futures import ThreadPoolExecutor
 from http.client import HTTPConnection
 from typing import Any
 
@@ -88,7 +89,7 @@ def test_a_document_and_itself_are_the_same(http: httpx.Client) -> None:
     found = compare(http, document(seed=1), document(seed=2))
     assert found == {
         "different": False, "p_value": 1.0, "mean_difference": 0.0, "rmse": 0.0, "psnr": None, "flip": 0.0,
-        "ssim": 1.0, "samples": {"a": 0, "b": 0}, "regions": [],
+        "ssim": 1.0, "differing": {"share": 0.0, "difference": 0.0}, "samples": {"a": 0, "b": 0}, "regions": [],
     }  # fmt: skip
 
 
@@ -110,6 +111,7 @@ def test_another_roughness_is_found_at_once_where_it_is(http: httpx.Client) -> N
         assert columns.min() - 2 <= each["x"] and each["x"] + each["width"] <= columns.max() + 3
         assert rows.min() - 2 <= each["y"] and each["p_value"] >= found["p_value"]
     assert found["rmse"] > 0 and found["flip"] > 0 and found["ssim"] < 1 and found["psnr"] < 60
+    assert 0 < found["differing"]["share"] <= ball.mean() and 0 < found["differing"]["difference"] < 0.5
 
 
 def test_roughness_of_30_and_305_hundredths_is_found(http: httpx.Client) -> None:
@@ -275,6 +277,22 @@ def test_a_time_limit_ends_it(http: httpx.Client) -> None:
     """Of no samples' number: a comparison of equal noise would go on to 2^24 samples."""
     a, b = (document(samples=2**24, time_limit=0.2, roulette_depth=each) for each in (1, 3))
     assert compare(http, a, b)["samples"]["a"] < 2**20
+
+
+def test_how_far_a_comparison_is_can_be_asked(server: Server) -> None:
+    sides = [document(samples=256, size=64, roulette_depth=each) for each in (1, 3)]
+    assert server.http.get("/v1/compare/mine").status_code == 204
+    with ThreadPoolExecutor(1) as pool:
+        body = {"a": sides[0], "b": sides[1]}
+        answer = pool.submit(httpx.post, f"{server.url}/v1/compare", params={"name": "mine"}, json=body, timeout=120)
+        told = set[tuple[int, int]]()
+        while not answer.done():
+            found = server.http.get("/v1/compare/mine")
+            if found.status_code == 200:
+                told.add((found.json()["samples"], found.json()["max_samples"]))
+    assert answer.result().status_code == 200
+    assert {most for _, most in told} == {256} and {taken for taken, _ in told} <= set(range(0, 256, 16))
+    assert server.http.get("/v1/compare/mine").status_code == 204, "it has ended"
 
 
 def test_going_away_ends_the_work(server: Server) -> None:
