@@ -26,7 +26,6 @@ from service.bench import machine
 
 SCENE = "sphere-on-floor"  # the editor's default
 SIZE = 512
-SUBJECT = "subject"  # the material that is there to be changed; other scenes' first shape has theirs
 MOVES = 60
 PAUSE_S = 0.15  # between slider moves: the pace of a hand; the picture goes on refining meanwhile
 PATIENCE_S = 60.0
@@ -109,6 +108,7 @@ class Editor:
     def _load(self, scene: str) -> None:
         with urlopen(f"http://127.0.0.1:{self._port}/v1/presets/scenes/{scene}", timeout=PATIENCE_S) as answer:
             self.scene = json.load(answer)
+        self.subject = presets.subject(self.scene)
 
     def start(self, began: float) -> float:
         """Milliseconds from `began` to the first image."""
@@ -125,10 +125,9 @@ class Editor:
     def move(self) -> float:
         """Milliseconds from sending a slider's new value to having the first frame that shows it."""
         value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
-        materials = self.scene["materials"]
-        name = SUBJECT if SUBJECT in materials else self.scene["shapes"][0]["material"]
-        slider = {"diffuse": "albedo", "openpbr": "specular_roughness"}.get(materials[name]["type"], "roughness")
-        return self.change({"materials": {name: {slider: value}}})
+        model = self.scene["materials"][self.subject]["type"]
+        slider = {"diffuse": "albedo", "openpbr": "specular_roughness"}.get(model, "roughness")
+        return self.change({"materials": {self.subject: {slider: value}}})
 
     def turn(self) -> float:
         """The same of a camera that goes half a degree around what it looks at."""

@@ -38,7 +38,6 @@ from service.problems import NotFound
 
 KINDS = ("scenes", "materials", "environments", "stages")
 DEFAULT_SCENE = "shader-ball"
-SUBJECT = "subject"  # the material that is looked at there
 # A material for each kernel that many of the library need, the most useful first.
 FAVOURITES = ("gold", "skin", "glass", "ceramic", "car-paint", "matte-clay", "jade", "brushed-aluminium")
 
@@ -95,11 +94,18 @@ def likely() -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]
     return shown, edits, [get("scenes", name) for name in others]
 
 
+def subject(scene: dict[str, Any]) -> str:
+    """The material that the eye goes to: that of the first thing which is not flat, which the editor selects."""
+    solid = (shape for shape in scene["shapes"] if shape["type"] not in ("quad", "disk"))
+    name: str = next(solid, scene["shapes"][0])["material"]
+    return name
+
+
 def _dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
     """The scene with its subject made of a material of the library, which may be stored with its textures."""
     (bare,) = material["materials"].values() if "materials" in material else [material]
     more = {"textures": scene.get("textures", {}) | material["textures"]} if "textures" in material else {}
-    return scene | {"materials": scene["materials"] | {SUBJECT: bare}} | more
+    return scene | {"materials": scene["materials"] | {subject(scene): bare}} | more
 
 
 def default_environment() -> dict[str, Any]:

@@ -24,7 +24,6 @@ ROWS: dict[str, dict[str, Any]] = {
     "clearcoat": {"base_color": [0.14, 0.008, 0.02], "roughness": 1, "specular": 0},
     "clearcoat_gloss": {"base_color": [0.14, 0.008, 0.02], "roughness": 1, "specular": 0, "clearcoat": 1},
 }
-SUBJECT = "roughness", 5
 # A lamp from the front, by whose highlight gloss is judged, and one from behind: sheen is seen against the light.
 LAMPS = [
     {"type": "directional", "direction": [0.5, -0.6, -0.8], "irradiance": 2, "angular_diameter": 5},
@@ -45,7 +44,7 @@ def parameter_rows() -> dict[str, Any]:
     for row, (parameter, others) in enumerate(ROWS.items()):
         for step in range(STEPS):
             value = round(step / (STEPS - 1), 3)
-            name = "subject" if (parameter, step) == SUBJECT else f"{parameter}-{value:g}"
+            name = f"{parameter.replace('_', ' ').replace('color', 'colour').capitalize()} {value:.1f}"
             materials[name] = {"type": "disney", **others, parameter: value}
             shapes.append(_ball(step - (STEPS - 1) / 2, (len(ROWS) - 1) / 2 - row, name))
     chart = _chart("Disney parameters, 0 to 1", "disney-parameters-labels", materials, shapes, distance=26.5)
@@ -67,8 +66,7 @@ def parameter_grid() -> dict[str, Any]:
     for block, specular in enumerate(GRID_SPECULAR):
         for row, metallic in enumerate(GRID):
             for column, roughness in enumerate(GRID):
-                is_subject = (specular, metallic, roughness) == (0.5, 0.5, 0.5)
-                name = "subject" if is_subject else f"specular-{specular:g}-metallic-{metallic:g}-rough-{roughness:g}"
+                name = f"Metallic {metallic:g}, roughness {roughness:g}, specular {specular:g}"
                 materials[name] = {
                     "type": "disney",
                     "base_color": [0.75, 0.34, 0.16],

@@ -26,20 +26,23 @@ def test_every_slider_changes_its_number_and_gives_it_back(name: str) -> None:
 
 def test_sliders_are_of_the_first_material_of_each_kind() -> None:
     names = {slider.name for slider in sliders(presets.get("scenes", "cornell-spheres"))}
-    assert {"materials/subject/roughness", "materials/lamp/emission", "materials/white/albedo"} <= names
-    assert not any(name.startswith(("materials/red", "materials/steel")) for name in names)
+    assert {"materials/White porcelain/roughness", "materials/Lamp/emission", "materials/White walls/albedo"} <= names
+    assert not any(name.startswith(("materials/Red", "materials/Steel")) for name in names)
     assert "lights/1/intensity" in {slider.name for slider in sliders(presets.get("scenes", "point-lights"))}
 
 
 @pytest.mark.bench
 def test_first_frames_are_measured_at_a_real_server(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = [Slider(("camera", "vfov"), 20, 60, "number"), Slider(("materials", "subject", "albedo"), 0, 1, "color")]
+    found = [
+        Slider(("camera", "vfov"), 20, 60, "number"),
+        Slider(("materials", "White walls", "albedo"), 0, 1, "color"),
+    ]
     monkeypatch.setattr(first_frames, "sliders", lambda document: found)
     monkeypatch.setattr(first_frames, "QUIET_S", 2.0)
     monkeypatch.setattr(first_frames.presets, "names", lambda kind: [{"name": "matte-clay"}])
     document = first_frames.measure(["cornell-empty"], lambda line: None, moves=2)
     row = document["scenes"][0]
-    assert row["sliders"].keys() == {"camera/vfov", "materials/subject/albedo"}
+    assert row["sliders"].keys() == {"camera/vfov", "materials/White walls/albedo"}
     assert all(len(times) == 2 and min(times) > 0 for times in row["sliders"].values())
     assert row["start_ms"] > row["change_again_ms"] > 0 and row["change_ms"] > 0 and row["change_foreseen_ms"] > 0
     assert [each["name"] for each in document["thumbnails"]] == ["matte-clay"]

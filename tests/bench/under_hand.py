@@ -32,13 +32,13 @@ SETTINGS = {"width": 768, "height": 432, "max_samples": 1 << 20, "max_bounces": 
 REFERENCE_SAMPLES = 48
 # What a drag does to a scene: the change at 0 to 1 of its way.
 DRAGS: dict[str, tuple[str, Any]] = {
-    "roughness": ("sphere-on-floor", lambda x: {"materials": {"subject": {"roughness": 0.15 + 0.5 * x}}}),
+    "roughness": ("sphere-on-floor", lambda x: {"materials": {"Red paint": {"roughness": 0.15 + 0.5 * x}}}),
     "colour": (
         "sphere-on-floor",
-        lambda x: {"materials": {"subject": {"base_color": [0.62 - 0.5 * x, 0.07, x / 2]}}},
+        lambda x: {"materials": {"Red paint": {"base_color": [0.62 - 0.5 * x, 0.07, x / 2]}}},
     ),
-    "metallic": ("cornell-spheres", lambda x: {"materials": {"subject": {"metallic": x}}}),
-    "lamp": ("cornell-spheres", lambda x: {"materials": {"lamp": {"emission": [30.0 - 20 * x, 23.0 - 8 * x, 13.0]}}}),
+    "metallic": ("cornell-spheres", lambda x: {"materials": {"White porcelain": {"metallic": x}}}),
+    "lamp": ("cornell-spheres", lambda x: {"materials": {"Lamp": {"emission": [30.0 - 20 * x, 23.0 - 8 * x, 13.0]}}}),
     "camera": ("sphere-on-floor", lambda x: {"camera": {"position": [5.2 * sin(x / 4), 1.5, 5.2 * cos(x / 4)]}}),
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def among(kind: str, document: dict[str, Any]) -> dict[str, Any]:
     if kind != "environments":
         scene["environment"] = {"type": "constant", "radiance": 1}  # which has no tables to build
     if kind == "materials":
-        scene["materials"]["subject"], scene["textures"] = dressed(document)
+        scene["materials"]["Red paint"], scene["textures"] = dressed(document)
     elif kind == "stages":
         scene["materials"] |= document["materials"]
         scene["shapes"] += document["shapes"]
@@ -168,6 +169,13 @@ def test_what_artists_open_speaks_their_words(name: str) -> None:
     words = [*document["materials"], *document.get("textures", {}), *(thing["name"] for thing in things)]
     assert all(word[0].isupper() and "-" not in word for word in words)
     assert len({thing["name"] for thing in things}) == len(things)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_scene_has_a_programmer_s_names(name: str) -> None:
+    document = presets.get("scenes", name)
+    assert all(re.match("[A-Z][a-z]", each) for each in document["materials"])
+    assert presets.subject(document) in document["materials"]
 
 
 def test_documents_are_the_caller_s_own() -> None:

@@ -87,7 +87,7 @@ def measure(stage: Stage) -> dict[str, Any]:
 def scene(material: Document, light: str) -> Document:
     """The knot of the presets, on its floor."""
     document = presets.get("scenes", "generated-mesh")
-    document["materials"]["subject"] = material
+    document["materials"][presets.subject(document)] = material
     document["environment"] = presets.get("environments", light)
     return document
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from gpu import SceneArrays
 from service import presets
 from service.bench.device import stage
-from service.bench.latency import SUBJECT
 from service.bench.scenes import BenchAssets
 from service.pack import pack
 from service.scene import parse_scene
@@ -23,9 +22,9 @@ def arrays(name: str) -> SceneArrays:
         return stage.arrays(name)
     document, worn = presets.get("scenes", scene), presets.get("materials", material)
     if "type" in worn:
-        document["materials"][SUBJECT] = worn
+        document["materials"][presets.subject(document)] = worn
     else:  # with textures of its own
         for kind, things in worn.items():
             document.setdefault(kind, {}).update(things)
-        document["materials"][SUBJECT] = next(iter(worn["materials"].values()))
+        document["materials"][presets.subject(document)] = next(iter(worn["materials"].values()))
     return pack(parse_scene(document), BenchAssets()).arrays

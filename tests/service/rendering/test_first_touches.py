@@ -91,9 +91,9 @@ def touches(document: Any) -> Iterator[tuple[Slider, KernelRequest, RenderSettin
 @pytest.mark.parametrize(("name", "more"), [("film_thickness", {}), ("abbe", {"transmission": 1})])
 def test_a_rare_slider_is_foreseen_as_the_first(name: str, more: dict[str, Any]) -> None:
     document = presets.get("scenes", "sphere-on-floor")
-    document["materials"]["subject"] = {"type": "principled", **more}
+    document["materials"]["Red paint"] = {"type": "principled", **more}
     first = Shown(document)
-    (slider,) = (each for each in sliders(document) if each.name == f"materials/subject/{name}")
+    (slider,) = (each for each in sliders(document) if each.name == f"materials/Red paint/{name}")
     keys, _ = foreseen(first.arrays, first.settings)
     asked = [request for share in SHARES if (request := first.change(slider.patch(document, share)))]
     assert asked and all(request.key in keys for request in asked)
@@ -143,8 +143,8 @@ def test_only_what_is_packed_holds_the_picture() -> None:
     for slider in sliders(presets.get("scenes", "sphere-on-floor")):
         shown.change(slider.patch(presets.get("scenes", "sphere-on-floor"), 0.618))
         packs[slider.name] = shown.packs
-    assert packs["environment/blur"] and packs["materials/subject/emission"]
-    assert not any(packs[name] for name in ("camera/vfov", "environment/rotation", "materials/subject/roughness"))
+    assert packs["environment/blur"] and packs["materials/Red paint/emission"]
+    assert not any(packs[name] for name in ("camera/vfov", "environment/rotation", "materials/Red paint/roughness"))
 
 
 def test_a_superset_kernel_depends_on_no_light() -> None:
@@ -153,7 +153,7 @@ def test_a_superset_kernel_depends_on_no_light() -> None:
     shown = Shown(document)
     superset = fallback.superset(shown.arrays)
     before = fallback.kernel_key(shown.arrays, shown.settings, superset)
-    for patch in ({"materials": {"subject": {"emission": 2.0}}}, {"lights": document["lights"][:1]}):
+    for patch in ({"materials": {"Red paint": {"emission": 2.0}}}, {"lights": document["lights"][:1]}):
         request = shown.change(patch)
         assert request is not None and fallback.kernel_key(request.arrays, request.settings, superset) == before
 
