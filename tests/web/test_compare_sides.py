@@ -176,7 +176,7 @@ def test_a_photograph_is_fitted_by_hand_in_linear_light(editor: Editor) -> None:
     editor.wait("as it is", lambda: np.abs(middles() - stripes).max() <= 1)
     for title in ("FLIP", "Verdict"):
         assert side(editor, "Comparison").locator("option", has_text=title).is_disabled()
-    assert page.get_by_text("neither a verdict nor FLIP").is_visible(), "and why"
+    assert page.get_by_text("no verdict and no FLIP").is_visible(), "and why"
 
     editor.drop("#stage", {"other.png": picture([(0, 255, 0)])})
     editor.wait("the other", lambda: "other.png" in editor.text(".variant.b"))
@@ -238,15 +238,18 @@ def test_the_server_says_whether_two_differ(editor: Editor, server: Server) -> N
     finish(editor, 16)
     editor.compare()
     way(editor, "Verdict")
-    editor.wait("the verdict on a copy", lambda: verdict(editor).startswith("The same within noise"))
+    editor.wait("the verdict on a copy", lambda: verdict(editor).startswith("They look the same"))
     assert not overlay(editor, "difference").any(), "the pictures are to be seen"
     page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
-    editor.wait("another B", lambda: verdict(editor).startswith("Something has changed"))
-    page.get_by_role("button", name="Ask again").press("Enter")
-    assert verdict(editor).startswith("Comparing")
-    editor.wait("the verdict", lambda: verdict(editor).startswith("Different: p "))
+    editor.wait("another B", lambda: verdict(editor).startswith("Changed"))
+    editor.wait("the verdict, which nobody asked for", lambda: verdict(editor).startswith("They look different: "))
     said = page.get_by_role("status", name="Verdict")
-    assert "FLIP" in (said.text_content() or "") and said.get_attribute("aria-live") == "polite"
+    assert "p = " not in verdict(editor) and "p = " in (said.get_attribute("title") or "")
+    assert said.get_attribute("aria-live") == "polite"
+    assert said.locator(".scale").inner_text() == "almost certaincertain", "the colours are explained"
+    page.get_by_role("button", name="Ask again").press("Enter")
+    assert verdict(editor).startswith("Comparing") and said.get_by_role("progressbar").count() == 1
+    editor.wait("the verdict again", lambda: verdict(editor).startswith("They look different: "))
     drawn = overlay(editor, "difference")
     height, width = drawn.shape[:2]
     assert drawn[height // 2, width // 2, 3] > 0, "the ball is under a veil"
@@ -263,7 +266,7 @@ def test_the_server_says_whether_two_differ(editor: Editor, server: Server) -> N
     page.on("request", lambda each: asked.append(each.post_data_json) if "/v1/compare?" in each.url else None)
     way(editor, "Verdict")
     choose(editor, "Right", f"render {id}")
-    editor.wait("the verdict on it", lambda: asked and verdict(editor).startswith(("The same", "Different")))
+    editor.wait("the verdict on it", lambda: asked and verdict(editor).startswith("They look"))
     assert asked[-1]["b"] == id
     assert (asked[-1]["a"]["settings"]["width"], asked[-1]["a"]["settings"]["height"]) == (48, 32)
 
@@ -275,15 +278,14 @@ def test_who_edits_or_leaves_ends_the_comparison(editor: Editor) -> None:
     held: list[Any] = []
     ended: list[str] = []
     page.route("**/v1/compare*", lambda route: held.append(route))
-    page.on("requestfailed", lambda each: ended.append(each.url))
+    page.on("requestfailed", lambda each: ended.append(each.url) if "/compare?" in each.url else None)
     way(editor, "Verdict")
     editor.wait("the question", lambda: len(held) == 1)
     assert verdict(editor).startswith("Comparing")
     page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
     editor.wait("its end", lambda: len(ended) == 1)
-    assert verdict(editor).startswith("Something has changed") and len(held) == 1, "nobody asked again"
-    page.get_by_role("button", name="Ask again").click()
-    editor.wait("the next", lambda: len(held) == 2)
+    assert verdict(editor).startswith("Changed") and len(held) == 1, "the edit has to rest"
+    editor.wait("the next, which nobody asked for", lambda: len(held) == 2)
     page.get_by_role("button", name="Stop").click()
     editor.wait("its end", lambda: len(ended) == 2 and verdict(editor) == "Stopped")
     way(editor, "FLIP")
@@ -293,19 +295,24 @@ def test_who_edits_or_leaves_ends_the_comparison(editor: Editor) -> None:
 
 
 def test_a_verdict_in_words(page: Page) -> None:
-    def words(p_value: float, *boxes: tuple[int, int, int, int]) -> Any:
+    def words(p_value: float, *boxes: tuple[int, int, int, int], difference: float = 0.042) -> Any:
         known = np.zeros((30, 60, 4), int)
         for x, y, width, height in boxes:
             known[y : y + height, x : x + width, :3] = 90
-        answer = {"different": p_value < 1e-3, "p_value": p_value}
+        differing = {"share": (known[..., 0] > 0).mean(), "difference": difference}
+        answer = {"different": p_value < 1e-3, "p_value": p_value, "differing": differing}
         image = {"data": known.ravel().tolist(), "width": 60, "height": 30}
         place = call(page, "compare/verdict.js", "placeOf", image)
         return call(page, "compare/verdict.js", "verdictWords", answer, place)
 
-    assert words(0.4) == "The same within noise"
-    assert words(2e-6, (0, 0, 15, 6)) == "Different: p = 2e-6, mostly in the upper left"
-    assert words(2e-6, (4, 24, 40, 4)) == "Different: p = 2e-6, mostly at the bottom"
-    assert words(2e-6, (45, 1, 12, 27)) == "Different: p = 2e-6, mostly at the right"
-    assert words(2e-6, (22, 11, 15, 8)) == "Different: p = 2e-6, mostly in the middle"
-    assert words(2e-6, (0, 0, 12, 6), (48, 24, 12, 6)) == "Different: p = 2e-6", "at no one place"
-    assert words(1e-300, (0, 0, 60, 28)) == "Different: p is practically 0", "everywhere"
+    assert words(0.4) == "They look the same"
+    certain = "They look different: certain."
+    assert words(2e-8, (0, 0, 15, 6)) == f"{certain} Most at the upper left, 4 % there."
+    assert words(2e-8, (4, 24, 40, 4)) == f"{certain} Most at the bottom, 4 % there."
+    assert words(2e-8, (45, 1, 12, 27)) == f"{certain} Most at the right, 4 % there."
+    assert words(2e-8, (22, 11, 15, 8), difference=0.002) == f"{certain} Most in the middle, less than 1 % there."
+    assert words(2e-8, (0, 0, 12, 6), (48, 24, 12, 6)) == f"{certain} In several places, by 4 %."
+    assert words(1e-300, (0, 0, 60, 28)) == f"{certain} Nearly everywhere, by 4 %."
+    assert words(2e-5) == "They look different: almost certain.", "as a whole"
+    said = call(page, "compare/verdict.js", "progressWords", {"samples": 64, "max_samples": 256}, 10)
+    assert said == "64 of at most 256 samples, 30 s left at most"

@@ -85,12 +85,12 @@ def test_b_is_awaited_in_words_and_a_link_keeps_the_way_of_comparing(editor: Edi
     editor.compare()
     page.select_option(WAY, "difference")
     page.select_option("#comparison [aria-label^='How much']", "16")
-    awaited = "B · Principled · waiting for its first frame"
+    awaited = "B · Principled · being prepared"
     assert page.locator(".variant").all_text_contents() == ["Difference ×16", awaited]
     assert page.is_hidden("#difference") and page.is_hidden("#picture-b"), "A is there, and stays"
     page.select_option(WAY, "swipe")
     assert page.locator(".variant.b").text_content() == awaited
-    assert page.get_by_role("status", name="Verdict").inner_text() == "B is waiting for its first frame"
+    assert page.get_by_role("status", name="Verdict").inner_text() == "B is being prepared"
     page.select_option(WAY, "difference")
 
     page.click("#share")

@@ -11,13 +11,13 @@ import { Choices } from "./choices.js";
 import { NEUTRAL } from "./photograph.js";
 
 const PICTURES = ".png,.jpg,.jpeg,.webp,.avif";
-const WHY_NOT = "A photograph's noise is not known, so there is neither a verdict nor FLIP with one.";
+const WHY_NOT = "There is no verdict and no FLIP with a photograph, as nobody knows its noise.";
 
 // What is set by hand of a photograph, in stops: [name, title, most to either side, what its ends do].
 const STOPS = [
-  ["exposure", "Exposure", 6, "Stops, in linear light"],
-  ["temperature", "Temperature", 2, "Cold to warm: stops of red against blue, in linear light"],
-  ["tint", "Tint", 1, "Green to magenta: stops, in linear light"],
+  ["exposure", "Exposure", 6, "Brighter or darker, in stops"],
+  ["temperature", "Temperature", 2, "Colder or warmer, in stops"],
+  ["tint", "Tint", 1, "Greener or more magenta, in stops"],
 ];
 
 // Of each way to compare.
@@ -41,6 +41,8 @@ const button = (label, does, more = {}) =>
   element("button", { type: "button", class: "button small", onclick: does, ...more }, label);
 
 export class CompareBar {
+  #told = "";
+
   // `acts` is the editor; `models` are those that B can be turned into; `choose(members)` of what is compared,
   // `place(side, name)`, `ask()` the server or stop that; `takePhoto(file)`, `setPhoto(stops)`.
   constructor(root, { acts, models, choose, place, ask, takePhoto, setPhoto }) {
@@ -59,7 +61,7 @@ export class CompareBar {
       option("absolute", "Absolute"),
       option("signed", "Signed"),
     );
-    this.signs.title = "Signed: brighter than grey where the right is brighter";
+    this.signs.title = "Signed: brighter than grey where the right picture is brighter";
     this.gains = select(
       "How much the difference is brightened",
       (gain) => choose({ gain: Number(gain) }),
@@ -162,7 +164,7 @@ export class CompareBar {
       "div",
       { class: "of-variants seldom" },
       button("Swap A and B", () => acts.swapVariants()),
-      button("Discard B", () => acts.discardB(), { title: "Throws variant B away; Done keeps it" }),
+      button("Discard B", () => acts.discardB(), { title: "Throws variant B away. Done keeps it." }),
     );
     return this.variants;
   }
@@ -241,16 +243,25 @@ export class CompareBar {
     }
   }
 
-  // One line, and beside it what matters less. `isSpoken`: to those who cannot see it, too.
-  tell(text, beside = "", isSpoken = false) {
+  // One line: `text`, and `beside` it what matters less; `facts` are in a tooltip. What is awaited has a `share`, 0 where
+  // that is not known yet; a map has a `scale`, as `legend` takes it. `isSpoken`: to those who cannot see it, too.
+  tell({ text, beside = "", share = null, scale = null, facts = "", isSpoken = false }) {
     const live = isSpoken ? "polite" : "off"; // figures that follow the samples would never be silent
     if (this.metric.ariaLive !== live) this.metric.ariaLive = live;
-    const whole = [text, beside].filter(Boolean).join(" · ");
-    if (this.metric.title === whole) return;
-    this.metric.title = whole;
+    const told = JSON.stringify([text, beside, share, scale, facts]);
+    if (told === this.#told) return;
+    this.#told = told;
+    this.metric.title = [text, beside, facts].filter(Boolean).join(" · ");
+    const done = { max: "1", "aria-label": "Compared", ...(share ? { value: String(share) } : {}) };
     this.metric.replaceChildren(
       element("b", {}, text),
+      share === null ? "" : element("progress", done),
       element("span", { class: "beside" }, beside && ` · ${beside}`),
+      scale ? legend(scale) : "",
     );
   }
 }
+
+// {from, to, map}: the words for both ends of a map's colours.
+const legend = ({ from, to, map }) =>
+  element("span", { class: `scale ${map}` }, from, element("i", { "aria-hidden": "true" }), to);

@@ -5,14 +5,16 @@ import { amount } from "../lib/format-text.js";
 import { kindOf } from "../lib/files.js";
 import { element } from "../lib/dom.js";
 import { Paced } from "../lib/paced.js";
+import { equal } from "../lib/patch.js";
 import { ASKED, MODES, PHOTO, compared, gainOf, modeOf, placed, sidesOf } from "../document/variants.js";
 import { CompareBar } from "./bar.js";
 import { sideOf } from "./sides.js";
 import { difference } from "./difference.js";
 import { Photograph } from "./photograph.js";
-import { Question, factsOf, flipWords, verdictWords } from "./verdict.js";
+import { Question, besideOf, factsOf, flipWords, progressWords, verdictWords } from "./verdict.js";
 
 const DIFFERENCE_MS = 250; // between two of them
+const REST_MS = 1000; // an edit that has rested so long is asked about
 const SIDES = ["left", "right"];
 const BETWEEN = ["difference", "heat"]; // shown by one picture, which is made here
 const SPLIT = ["swipe", "verdict"]; // shown as two halves under a bar that moves
@@ -24,6 +26,7 @@ export class Comparison {
   #differences = new Paced(DIFFERENCE_MS, () => this.#compare());
   #photograph = null;
   #wanted = null; // of the page's own stream, while something is compared
+  #resting = { subjects: null, timer: 0 }; // what is asked about unless it is edited again
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor; `models` are
   // those that B can be turned into; `names(aov, document)` of layers; `headerOfA()` that of A's picture.
@@ -191,7 +194,7 @@ export class Comparison {
     return { width, height };
   }
 
-  // Asks when this is chosen; after that only when somebody says so. An edit ends what was asked before it.
+  // Asks when this is chosen, and again when an edit rests. An edit ends what was asked before it.
   #consult() {
     const names = sidesOf(this.#compared);
     if (!ASKED.includes(this.#mode)) return this.question.forget();
@@ -199,7 +202,21 @@ export class Comparison {
       this.question.forget();
       this.#empty();
       if (this.#sides.every(({ header, subject }) => header && subject)) this.#ask();
-    } else if (this.question.isOutdated(this.#subjects)) this.question.stop();
+    } else if (this.question.isOutdated(this.#subjects)) {
+      this.question.stop();
+      this.#askSoon(this.#subjects);
+    }
+  }
+
+  #askSoon(subjects) {
+    if (equal(subjects, this.#resting.subjects)) return;
+    clearTimeout(this.#resting.timer);
+    const timer = setTimeout(() => {
+      this.#resting.subjects = null;
+      const isWanted = this.isOn && ASKED.includes(this.#mode) && this.question.isOutdated(this.#subjects);
+      if (isWanted && this.#sides.every(({ header, subject }) => header && subject)) this.#ask();
+    }, REST_MS);
+    this.#resting = { subjects, timer };
   }
 
   #ask() {
@@ -222,23 +239,30 @@ export class Comparison {
     if (!ASKED.includes(this.#mode)) return;
     if (!question.answer || isOutdated) this.#empty();
     else this.#draw(question.answer);
-    const [text, beside] = this.#words();
-    this.bar.tell(text, beside, true);
+    this.bar.tell({ ...this.#words(), isSpoken: question.progress === null });
   }
 
   #words() {
-    const { answer, problem, isAsking } = this.question;
+    const { answer, problem, progress, isAsking } = this.question;
     const isFlip = this.#mode === "flip";
     const awaited = this.#awaited();
-    if (awaited) return [awaited];
-    if (isAsking) return [isFlip ? "Rendering both for FLIP…" : "Comparing, until it is certain…"];
-    if (this.question.isOutdated(this.#subjects)) return ["Something has changed since this was asked"];
-    if (problem) return [problem];
-    if (!answer) return ["Stopped"];
+    if (awaited) return { text: awaited };
+    if (isAsking) {
+      const beside = progress ? progressWords(progress, progress.seconds) : "";
+      return { text: "Comparing…", beside, share: progress ? progress.samples / progress.max_samples : 0 };
+    }
+    if (this.question.isOutdated(this.#subjects)) return { text: "Changed: it is compared again in a moment" };
+    if (problem) return { text: problem };
+    if (!answer) return { text: "Stopped" };
     const { verdict, place } = answer;
-    return isFlip
-      ? [flipWords(verdict), "the brighter, the more an eye sees of it"]
-      : [verdictWords(verdict, place), factsOf(verdict)];
+    const certainty = verdict.different ? { from: "almost certain", to: "certain", map: "of-p" } : null;
+    const scale = isFlip ? { from: "not seen", to: "plainly seen", map: "of-flip" } : certainty;
+    return {
+      text: isFlip ? flipWords(verdict) : verdictWords(verdict, place),
+      beside: isFlip ? "" : besideOf(verdict),
+      scale,
+      facts: factsOf(verdict),
+    };
   }
 
   // As high as the frame, as the pictures under it are; the map of FLIP is a picture of its own.
@@ -296,12 +320,12 @@ export class Comparison {
     this.#label();
     const sides = this.#sides;
     const headers = sides.map(({ header }) => header);
-    if (!headers.every(Boolean)) return this.bar.tell(this.#awaited());
+    if (!headers.every(Boolean)) return this.bar.tell({ text: this.#awaited() });
     const [a, b] = sides.map(({ canvas }) => canvas);
     const isSame = a.width === b.width && a.height === b.height;
     // A preview is not the picture: what is measured on it says nothing. Its difference is shown all the same.
     const isMeasured = isSame && headers.every(({ scale }) => scale >= 1);
-    if (!isMeasured) this.bar.tell("RMSE …");
+    if (!isMeasured) this.bar.tell({ text: "RMSE …" });
     const isShown = BETWEEN.includes(this.#mode);
     if (!isSame || !(isMeasured || isShown)) return;
     const out = isShown ? new ImageData(a.width, a.height) : null;
@@ -327,13 +351,11 @@ export class Comparison {
   #measured({ rmse, psnr, most }, headers) {
     const samples = headers.map((header) => header.samples);
     const isUneven = samples.every(Boolean) && samples[0] !== samples[1];
-    this.bar.tell(
-      `RMSE ${percent(rmse)}`,
-      [
-        ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []),
-        `largest ${percent(most)}`,
-        ...(isUneven ? [`at ${samples[0]} and ${samples[1]} samples`] : []),
-      ].join(" · "),
-    );
+    const beside = [
+      ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []),
+      `largest ${percent(most)}`,
+      ...(isUneven ? [`at ${samples[0]} and ${samples[1]} samples`] : []),
+    ].join(" · ");
+    this.bar.tell({ text: `RMSE ${percent(rmse)}`, beside });
   }
 }

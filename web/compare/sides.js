@@ -19,7 +19,7 @@ import { Viewport } from "../picture/viewport.js";
 const GONE = [404, 410];
 const LOOK_MS = 4000; // between two looks at a render that is under way
 const REST_MS = 200; // an exposure under the hand fetches no picture
-const FIRST_FRAME = "waiting for its first frame";
+const FIRST_FRAME = "being prepared";
 
 const canvasFor = (label) => element("canvas", { class: "half", role: "img", "aria-label": label });
 
@@ -192,7 +192,7 @@ class Still {
 
 // A final render, as the server has it, under the exposure and the tone map of the page.
 export class Render extends Still {
-  awaited = "reading its picture";
+  awaited = "being loaded";
   names = { long: ["Render"], short: "Render" };
   #bitmap = null;
   #painted;

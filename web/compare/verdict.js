@@ -1,12 +1,12 @@
 // What the server finds between two pictures: whether they are the same within noise, and where not; or the map of what
-// an eye would see (FLIP). It takes samples until it is decided, so it is asked for once and not again with every edit.
+// an eye would see (FLIP). It takes samples until it is decided, so it is asked again when an edit rests, not with each.
 
-import { amount } from "../lib/format-text.js";
+import { amount, count, duration } from "../lib/format-text.js";
 import { equal } from "../lib/patch.js";
 import { compareMap } from "../server/api.js";
 import { problemText } from "../server/problem-text.js";
 
-const LEAST = 1e-290; // the server gives no p below about 1e-300: one near that is as good as none
+const CERTAIN = 1e-6; // a p below that leaves no doubt
 const TINY = 1e-3; // a p below that is written as a power of ten
 const MOST = 0.6; // of what differs: what "mostly" says
 const WHOLE = 0.5; // of the picture: what differs over more than that is not somewhere
@@ -19,7 +19,7 @@ const ALONE = { upper: "at the top", lower: "at the bottom", left: "at the left"
 const short = (value) => String(Number(value.toPrecision(2)));
 const probability = (p) => (p < TINY ? p.toExponential(0) : short(p));
 
-// "in the upper left": where most of the pixels lie that are known to differ, those of a map that are not black; null
+// "at the upper left": where most of the pixels lie that are known to differ, those of a map that are not black; null
 // where they are all over the picture.
 export function placeOf({ data, width, height }) {
   const rows = [0, 0, 0];
@@ -36,28 +36,47 @@ export function placeOf({ data, width, height }) {
   const [row, column] = [most(rows), most(columns)];
   if (row === 1 && column === 1) return "in the middle";
   const words = [ROWS[row], COLUMNS[column]].filter(Boolean);
-  return words.length === 2 ? `in the ${words.join(" ")}` : (ALONE[words[0]] ?? null);
+  return words.length === 2 ? `at the ${words.join(" ")}` : (ALONE[words[0]] ?? null);
 }
 
 const isKnown = (data, i) => data[i] + data[i + 1] + data[i + 2] > 0;
 
-// The answer as a sentence; `place` as placeOf has it.
-export function verdictWords({ different, p_value }, place) {
-  if (!different) return "The same within noise";
-  const p = p_value <= LEAST ? "p is practically 0" : `p = ${probability(p_value)}`;
-  return `Different: ${[p, ...(place ? [`mostly ${place}`] : [])].join(", ")}`;
+// How much they differ, of 0 to 1 as displayed.
+const step = (difference) => (difference < 0.01 ? "less than 1 %" : `${Math.round(100 * difference)} %`);
+
+// The answer as sentences; `place` as placeOf has it.
+export function verdictWords({ different, p_value, differing }, place) {
+  if (!different) return "They look the same";
+  const told = `They look different: ${p_value < CERTAIN ? "certain" : "almost certain"}.`;
+  if (!differing.share) return told; // as a whole, though no single part is known to
+  const by = step(differing.difference);
+  if (place) return `${told} Most ${place}, ${by} there.`;
+  return differing.share > WHOLE ? `${told} Nearly everywhere, by ${by}.` : `${told} In several places, by ${by}.`;
 }
 
 export const flipWords = ({ flip }) => `FLIP ${short(flip)}`;
 
-// What is beside it: how much, in measures that others know.
-export function factsOf({ flip, ssim, psnr, samples }) {
+// What is beside it.
+export const besideOf = ({ different, samples }) =>
+  [...(different ? [] : ["no more than noise"]), ...(samples.b ? [`after ${amount(samples.b, "sample")}`] : [])].join(
+    " · ",
+  );
+
+// In measures that others know: a tooltip.
+export function factsOf({ p_value, flip, ssim, psnr }) {
   return [
+    `p = ${probability(p_value)}`,
     flipWords({ flip }),
     `SSIM ${short(ssim)}`,
     ...(psnr === null ? [] : [`PSNR ${psnr.toFixed(1)} dB`]),
-    ...(samples.b ? [`of ${amount(samples.b, "sample")}`] : []),
   ].join(" · ");
+}
+
+// How far the server is, {samples, max_samples}, after some seconds.
+export function progressWords({ samples, max_samples }, seconds) {
+  if (!samples) return `at most ${amount(max_samples, "sample")}`;
+  const left = duration(seconds * (max_samples / samples - 1));
+  return `${count(samples)} of at most ${amount(max_samples, "sample")}, ${left} left at most`;
 }
 
 // Makes a map's black clear, and the rest such that the pictures are seen through it.
@@ -74,8 +93,8 @@ const sized = ({ scene, settings: { denoise: _, ...settings } }, { width, height
 });
 
 // {verdict, image, place}: a map of certainty for a verdict, else of what an eye sees.
-async function answered(kind, a, b, signal) {
-  const { verdict, blob } = await compareMap(a, b, kind === "verdict" ? "p" : kind, signal);
+async function answered(kind, a, b, options) {
+  const { verdict, blob } = await compareMap(a, b, kind === "verdict" ? "p" : kind, options);
   const bitmap = await createImageBitmap(blob);
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
   context.drawImage(bitmap, 0, 0);
@@ -90,6 +109,7 @@ const placeWords = (pointer) => ({ "/a": "The left picture", "/b": "The right pi
 export class Question {
   answer = null; // {verdict, image, place}
   problem = ""; // why there is none
+  progress = null; // {samples, max_samples, seconds} of one that is awaited
   #about = null; // {kind, subjects, names}
   #asking = null;
 
@@ -119,23 +139,29 @@ export class Question {
     this.#asking = asking;
     this.#about = { kind, subjects, names };
     this.changed();
+    const began = performance.now();
+    const progress = (told) => {
+      if (this.#asking !== asking) return;
+      this.progress = { ...told, seconds: (performance.now() - began) / 1000 };
+      this.changed();
+    };
     const [a, b] = subjects.map((subject) => (typeof subject === "string" ? subject : sized(subject, size)));
     try {
-      const answer = await answered(kind, a, b, asking.signal);
+      const answer = await answered(kind, a, b, { signal: asking.signal, progress });
       if (asking.signal.aborted) return;
       this.answer = answer;
     } catch (problem) {
       if (asking.signal.aborted) return;
       this.problem = problemText(problem, {}, placeWords);
     }
-    this.#asking = null;
+    this.#asking = this.progress = null;
     this.changed();
   }
 
   // Closes the connection, which ends the work over there.
   stop() {
     this.#asking?.abort();
-    this.#asking = null;
+    this.#asking = this.progress = null;
   }
 
   forget() {

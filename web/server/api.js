@@ -6,6 +6,7 @@ import { readKey } from "./key.js";
 const root = new URL("v1/", document.baseURI);
 
 const PROTOCOL = "sunbox.v1";
+const LOOK_MS = 1000; // between two looks at how far a comparison is
 
 // What the service refused, as RFC 9457 tells it: `detail`, `status` and `errors` [{pointer, detail}].
 export class Problem extends Error {
@@ -122,11 +123,21 @@ export const batchStatus = (id) => get(`batches/${id}`);
 export const cancelBatch = (id) => ask("DELETE", `batches/${id}`, { keepalive: true });
 
 // What lies between two pictures, each {scene, settings} or the id of a render: {verdict, blob}, the latter a map of "p",
-// "flip" or what else the server draws. More samples are taken while it is undecided; `signal` ends that.
-export async function compareMap(a, b, map, signal) {
-  const query = new URLSearchParams({ format: "png", map });
-  const response = await ask("POST", `compare?${query}`, { ...json({ a, b }), signal });
-  return { verdict: JSON.parse(response.headers.get("sunbox-verdict")), blob: await response.blob() };
+// "flip" or what else the server draws. More samples are taken while it is undecided; `signal` ends that, and
+// `progress({samples, max_samples})` hears how many.
+export async function compareMap(a, b, map, { signal, progress }) {
+  const name = crypto.getRandomValues(new Uint32Array(3)).join("-");
+  const query = new URLSearchParams({ format: "png", map, name });
+  const looking = setInterval(async () => {
+    const response = await ask("GET", `compare/${name}`, { signal }).catch(() => null); // the answer itself tells why
+    if (response?.status === 200) progress(await response.json());
+  }, LOOK_MS);
+  try {
+    const response = await ask("POST", `compare?${query}`, { ...json({ a, b }), signal });
+    return { verdict: JSON.parse(response.headers.get("sunbox-verdict")), blob: await response.blob() };
+  } finally {
+    clearInterval(looking);
+  }
 }
 
 // A scene as a file of that format, what it loses, and how such a file's name ends.
