@@ -50,7 +50,7 @@ export class Adder {
     if (carries) return this.stage("ground");
     if (shines) return this.#addLight(title, shines);
     const { materials } = acts.state.scene;
-    const material = fresh(title.toLowerCase(), materials);
+    const material = fresh(title, materials);
     const made = make(acts.camera, this.controller.radius(), material);
     const around = await this.#surroundings();
     return this.#put([made], { materials: { [material]: acts.plainMaterial }, around, stands: !isFlat(made) });
@@ -84,7 +84,7 @@ export class Adder {
       const beam = type === "spot" ? { direction, ...beamAround(subject.radius, distance) } : {};
       return acts.add("lights", this.#apart({ type, position, ...beam, intensity: power(distance * distance) }));
     }
-    const material = fresh(title.toLowerCase(), acts.state.scene.materials);
+    const material = fresh(title, acts.state.scene.materials);
     const { shape, area } = lampShape(type, stand, subject, material);
     const own = { ...acts.blackMaterial, emission: power((distance * distance) / area) };
     return acts.add("shapes", shape, { materials: { ...acts.state.scene.materials, [material]: own } });

@@ -150,8 +150,8 @@ const TOOLS = {
   scale: "scale the selection; arrows",
   fly: "look around",
   focus: "focus by clicking",
-  inspect: "zoom to pixels; arrows move the cross",
-  highlight: "click where the chosen light, or the environment, has to be mirrored",
+  inspect: "zoom in to the pixels; arrows move the cross",
+  highlight: "click where the highlight of the chosen light, or the environment, should be",
 };
 
 // The keys of the commands and the words of the sheet that explains them: [{keys, shift, ctrl, does, says, group}].

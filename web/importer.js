@@ -100,7 +100,7 @@ export class Importer {
 
   #refuse(file, problem) {
     this.messages.show("refusal", {
-      title: `${file.name} was not taken.`,
+      title: `${file.name} could not be used.`,
       detail: problemText(problem, {}, fileValueWords),
     });
   }
@@ -108,7 +108,7 @@ export class Importer {
   // Whether a scene was opened.
   async #take(file, at, way) {
     const kind = kindOf(file);
-    if (!kind) throw new Error(`Sunbox reads ${ACCEPT.replaceAll(",", ", ")}.`);
+    if (!kind) throw new Error(`Sunbox can open ${ACCEPT.replaceAll(",", ", ")}.`);
     if (kind === "json") return this.#takeJson(JSON.parse(await file.text()), file, way);
     const recipe = way === "add" ? null : await readRecipe(file); // what is added is an image like any other
     if (recipe) {
@@ -136,7 +136,7 @@ export class Importer {
   #ask(file) {
     return question({
       title: `${file.name} is a whole scene`,
-      detail: "Its things can be added beside what is here, or it is opened in place of this scene.",
+      detail: "Add its things to this scene, or open it in place of this one.",
       choices: [
         { label: "Add", value: "add" },
         { label: "Open", value: "open" },
@@ -164,7 +164,7 @@ export class Importer {
     if (at !== null) await this.#aim(at, file);
     await this.acts.putFile(info.kind, info.id);
     const left = (info.warnings ?? []).map(warningText);
-    if (left.length) this.messages.show("import", { title: `${file.name} is odd.`, list: left });
+    if (left.length) this.messages.show("import", { title: `${file.name}: good to know.`, list: left });
   }
 
   // The id of a file that the person picks, or null; its name has one of these endings.
@@ -194,13 +194,13 @@ export class Importer {
     const material = inWords(this.acts.state.chosen.material);
     this.messages.show("import", {
       title: `${file.name} is on ${material}.`,
-      detail: "The picture was not ready to tell what it fell on, so the selected material took it.",
+      detail: "The picture was not ready to tell what lies there, so the selected material got the image.",
     });
   }
 
   // Selects what an image fell on, if it is not the background; false where that can't be told.
   async #aim({ x, y }, file) {
-    this.messages.show("upload", { title: `Finding what ${file.name} fell on`, lasting: true });
+    this.messages.show("upload", { title: `Finding the place of ${file.name}`, lasting: true });
     try {
       const shape = await this.controller.shapeAt(x, y);
       if (shape !== null) this.acts.select(pointer("shapes", shape));
@@ -245,7 +245,7 @@ export class Importer {
     const standing = whole ? await this.#grounded(document, whole) : document;
     this.acts.openScene(standing, stem(file), exposure);
     const taken =
-      exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
+      exposure === undefined ? [] : [`The exposure was set to ${exposure} stops, to suit the model's lights.`];
     const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", isUnderNoSky(document) ? studioToo : null);
     return true;
@@ -281,7 +281,7 @@ export class Importer {
     const left = document.lights?.length ?? 0;
     const told = left
       ? [
-          `Its ${left === 1 ? "light was" : `${left} lights were`} left out, since this scene has light of its own. Open brings all.`,
+          `Its ${left === 1 ? "light was" : `${left} lights were`} left out, as this scene has its own. Open the file instead to bring all.`,
         ]
       : [];
     this.#tell(file, [...told, ...warnings.filter(({ pointer: about = "" }) => !STAYS.test(about))], "good to know.");
@@ -310,13 +310,13 @@ export class Importer {
     const names = { title: titleOf(file), name: stem(file) };
     if (isOpened) {
       this.acts.openScene(await this.#grounded(await this.#alone(id, names), whole), names.name);
-      this.#tell(file, warnings, "taken as it is.");
+      this.#tell(file, warnings, "good to know.");
       return true;
     }
     const factor = await this.adder.addMesh(id, names);
     const size = factor < 1 ? `1/${count(Math.round(1 / factor))} of` : `${count(factor)} times`;
     const scaled = `It is shown at ${size} its size, as its file does not say a unit. Scale is in the inspector.`;
-    if (factor === 1) this.#tell(file, warnings, "taken as it is.");
+    if (factor === 1) this.#tell(file, warnings, "good to know.");
     else this.#tell(file, [scaled, ...warnings], "good to know.");
     return false;
   }
@@ -365,7 +365,7 @@ export class Importer {
   }
 
   #paint(place, { id, kind }, file) {
-    if (!this.takesTextures || !place) throw new Error("Nothing here takes an image.");
+    if (!this.takesTextures || !place) throw new Error("This has no place for an image.");
     if (kind !== "image") throw new Error("An image is needed here: PNG, JPEG, WebP, EXR or HDR.");
     this.thumbnails.keep(id, file);
     this.acts.change(pictured(this.acts.state, place, id, stem(file)));

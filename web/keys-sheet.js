@@ -19,7 +19,7 @@ const MOVES = [
       ["Shift", "drag", "slide the view; also the right button, or two fingers"],
       ["scroll", "come nearer, go away; also a pinch"],
       ["Alt", "drag", "turn the environment"],
-      ["Alt", "click", "put the chosen light, or turn the environment, so that its highlight lies there"],
+      ["Alt", "click", "put the highlight of the chosen light, or of the environment, there"],
       ["click", "select a thing and its material"],
       ["←", "→", "↑", "↓", "orbit; with Shift slide"],
       ["←", "→", "↑", "↓", "with Move, Rotate or Scale: change the selection by a step; with Shift by ten"],

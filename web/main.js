@@ -198,7 +198,7 @@ const preparing = new Preparing({
     const { home, chosen } = editor.state;
     if (home !== page.paintedHome) return { isOther: true, name: titleOf(chosen) || "the scene" };
     const { scene } = page.wanted;
-    return { isOther: false, name: changed(page.paintedScene, scene, (name) => editor.titleOfMaterial(name)) };
+    return { isOther: false, name: changed(page.paintedScene, scene) };
   },
 });
 

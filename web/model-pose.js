@@ -39,7 +39,7 @@ export async function askPose(
   schema,
   file,
   { id, variants = [], animations = [] },
-  { action, title = `How is ${file.name} taken?` },
+  { action, title = `Open ${file.name} as` },
 ) {
   const own = freshId("pose");
   const variant = menu(`${own}-variant`, "Variant", "As it was saved", variants);

@@ -2,7 +2,7 @@
 
 import { dressed } from "./document/dressing.js";
 import { received, withTextures } from "./document/material-set.js";
-import { fresh } from "./document/materials.js";
+import { fresh, selectedWith } from "./document/materials.js";
 import { amount, inWords } from "./lib/format-text.js";
 import { pointer } from "./lib/patch.js";
 
@@ -10,8 +10,8 @@ import { pointer } from "./lib/patch.js";
 // shelf alone.
 export function collected(state, thing, materials) {
   const [first, ...others] = materials;
-  const onThing = thing && dressed(state, thing, { document: alone(first), wanted: first.name });
-  let scene = onThing ? onThing.scene : state.scene;
+  const onThing = thing && dressed(state, [thing], { document: alone(first), wanted: first.name });
+  let { scene, compare } = onThing ?? state;
   let chosen = onThing?.material;
   for (const { name, ...set } of onThing ? others : materials) {
     const { material, textures } = received(scene, set);
@@ -19,7 +19,8 @@ export function collected(state, thing, materials) {
     scene = { ...withTextures(scene, textures), materials: { ...scene.materials, [free]: material } };
     chosen ??= free;
   }
-  return { scene, chosen: { ...state.chosen, ...(thing ? { thing } : {}), material: chosen } };
+  const selected = { ...state.chosen, ...(thing ? { thing } : {}), material: chosen };
+  return { scene, compare, chosen: { ...selected, thing: selectedWith({ scene, chosen: selected }, chosen) } };
 }
 
 const alone = ({ name, material, textures }) => ({ materials: { [name]: material }, textures });
@@ -45,10 +46,13 @@ export function placed({ name, material }, titles, isOne) {
   return isOne ? lines : lines.map((line) => `${name}, ${line}`);
 }
 
-// The thing that a set is for: what lies where it was dropped, else what is selected.
+// The thing that a set is for: what lies where it was dropped, else what is selected, also where the picture can't yet
+// tell what lies there; null where that is the background.
 export async function thingFor(at, { controller, state }) {
   const { thing } = state.chosen;
-  if (!at) return thing?.startsWith("/shapes/") ? thing : null;
-  const shape = await controller.shapeAt(at.x, at.y).catch(() => null); // no picture yet: it goes onto the shelf
+  const selected = thing?.startsWith("/shapes/") ? thing : null;
+  if (!at) return selected;
+  const shape = await controller.shapeAt(at.x, at.y).catch(() => undefined);
+  if (shape === undefined) return selected;
   return shape === null ? null : pointer("shapes", shape);
 }

@@ -29,23 +29,26 @@ def test_a_material_is_dragged_onto_a_thing(editor: Editor) -> None:
 
     def is_brass() -> bool:
         carry("#library [data-value=brass]")
-        return bool(document(editor)["materials"]["floor"].get("metallic") == 1)
+        return bool(document(editor)["materials"].get("Brass", {}).get("metallic") == 1)
 
     def is_shared() -> bool:
-        carry("#materials [data-value=subject]")
-        return bool(document(editor)["shapes"][1]["material"] == "subject")
+        carry("#materials [data-value='Red paint']")
+        return bool(document(editor)["shapes"][1]["material"] == "Red paint")
 
     editor.wait("brass on the floor", is_brass)
-    assert document(editor)["materials"]["subject"].get("metallic", 0) == 0
+    assert document(editor)["materials"]["Red paint"].get("metallic", 0) == 0
     editor.wait("the other", is_shared)
     # Both are made of one material now: only what was aimed at gets another.
-    ball = document(editor)["materials"]["subject"]
-    editor.wait(
-        "brass again", lambda: carry("#library [data-value=brass]") or "brass" in document(editor)["materials"]
-    )
+    ball = document(editor)["materials"]["Red paint"]
+
+    def is_parted() -> bool:
+        carry("#library [data-value=brass]")
+        return bool(document(editor)["shapes"][1]["material"] == "Brass")
+
+    editor.wait("brass again", is_parted)
     scene = document(editor)
-    assert [shape["material"] for shape in scene["shapes"]] == ["subject", "brass"]
-    assert scene["materials"]["subject"] == ball and scene["materials"]["brass"]["metallic"] == 1
+    assert [shape["material"] for shape in scene["shapes"]] == ["Red paint", "Brass"]
+    assert list(scene["materials"]) == ["Red paint", "Brass"] and scene["materials"]["Red paint"] == ball
 
 
 def test_what_hovers_over_a_thing_points_it_out_and_asks_for_nothing(editor: Editor) -> None:
@@ -87,6 +90,6 @@ def test_what_hovers_over_a_thing_points_it_out_and_asks_for_nothing(editor: Edi
     mouse.move(row["x"] + 24, row["y"] + row["height"] / 2, steps=4)
     editor.wait("the row", lambda: page.locator(f"{outline}.under-hand").count() == 1)
     mouse.up()
-    editor.wait("brass", lambda: document(editor)["materials"]["floor"].get("metallic") == 1)
+    editor.wait("brass", lambda: document(editor)["shapes"][1]["material"] == "Brass")
     page.keyboard.press("Control+z")
     assert document(editor) == scene and page.is_disabled("#undo"), "one step"

@@ -50,16 +50,16 @@ def test_nothing_is_lost_before_there_is_a_picture(blank: Editor, server: Server
     page.keyboard.press("ArrowLeft")  # another view, of which no picture comes
     page.keyboard.press("6")
     click(editor, 0.5, 0.5)
-    editor.wait("what to do", lambda: "Nothing can be focused on yet" in editor.text("#messages"))
+    editor.wait("what to do", lambda: "One moment: the picture is not ready." in editor.text("#messages"))
     page.keyboard.press("1")
     editor.drop("#stage", {"halves.png": halves()})
     editor.wait("the texture", lambda: page.is_visible("#material-form .texture"))
-    assert editor.chosen("materials") == "floor"
+    assert editor.chosen("materials") == "Floor"
     assert "halves.png is on Floor." in editor.text("#messages")
 
     slow.passing = "previews"
     page.keyboard.press("ArrowLeft")
-    editor.click_until("the ball, found in a preview", lambda: editor.chosen("materials") == "subject")
+    editor.click_until("the ball, found in a preview", lambda: editor.chosen("materials") == "Red paint")
 
 
 def test_an_image_that_comes_with_a_mesh_is_for_the_mesh(editor: Editor) -> None:

@@ -77,6 +77,6 @@ def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
 
     file.tree["materials"][1]["alphaMode"] = "HALF"
     editor.drop("#stage", {"bad.glb": file.glb()})
-    editor.wait("the refusal", lambda: "bad.glb was not taken" in editor.text("#messages"))
+    editor.wait("the refusal", lambda: "bad.glb could not be used" in editor.text("#messages"))
     refusal = editor.page.inner_text("#messages .refusal")
     assert "Material 2, alphaMode must be OPAQUE, MASK or BLEND, not 'HALF'." in refusal, refusal

@@ -49,8 +49,8 @@ def test_area_lights_are_aimed_at_the_selection_and_slide_round_it(editor: Edito
     middle, normal = aim(first["shapes"][2])
     way = ball - middle
     assert normal @ way / np.linalg.norm(way) == pytest.approx(1, abs=1e-3), "it faces the ball"
-    lamp = first["materials"]["area light"]
-    assert lamp["emission"] > 0 and editor.chosen("materials") == "area light"
+    lamp = first["materials"]["Area light"]
+    assert lamp["emission"] > 0 and editor.chosen("materials") == "Area light"
     gain = radiance(server, first) / radiance(server, before)
     assert 1.2 < gain < 1.7, f"half a stop over what is there, not {gain:.2f} times"
 
@@ -105,7 +105,7 @@ def test_marks_and_strengths(editor: Editor) -> None:
     assert page.get_by_role("button", name="What the camera looks at").count() == 1
 
     scene = add(editor, "Sphere light")
-    (lamp,) = [shape for shape in scene["shapes"] if shape["material"] == "sphere light"]
+    (lamp,) = [shape for shape in scene["shapes"] if shape["material"] == "Sphere light"]
     assert lamp["type"] == "sphere" and lamp["center"][1] > 1
     for _ in range(14):
         page.locator("#stage").press("-")
@@ -164,7 +164,7 @@ def test_a_lamp_is_set_as_a_photographer_does(editor: Editor) -> None:
         return page.locator(f"#lamp-part [data-field={name}]").get_by_label(label)
 
     def lamp() -> Any:
-        return document(editor)["materials"]["area light"]["emission"]
+        return document(editor)["materials"]["Area light"]["emission"]
 
     assert page.is_hidden("#material-part") and page.is_hidden("#thing-form")
     warmth = value("temperature", "Colour temperature: a temperature or a colour")

@@ -87,7 +87,7 @@ def textured(editor: Editor) -> dict[str, Any]:
         editor.drop(f"#material-form [data-field={field}]", {f"{name}.png": halves((0, 60 * i, 200))})
         chip = f"#material-form [data-field={field}] .texture"
         editor.wait("the texture", lambda chip=chip, name=name: name in editor.text(chip))
-    return shown(editor, "subject")
+    return shown(editor, "Red paint")
 
 
 def test_a_saved_material_is_used_in_another_scene(editor: Editor, server: Server) -> None:
@@ -105,7 +105,6 @@ def test_a_saved_material_is_used_in_another_scene(editor: Editor, server: Serve
     editor.pick("scenes", "point-lights")
     editor.wait("the scene", lambda: editor.chosen("scenes") == "point-lights")
     page.click("#tab-materials")
-    material = editor.chosen("materials")
     editor.unfold()
     editor.drop("#material-form [data-field=base_color]", {"worn-color.png": halves((200, 0, 0))})
     editor.wait("its own", lambda: "worn-color" in editor.text("[data-field=base_color] .texture"))
@@ -117,10 +116,10 @@ def test_a_saved_material_is_used_in_another_scene(editor: Editor, server: Serve
     assert said == "" or (said.startswith("Two point lights is open.") and said.endswith("Undo\n×")), (
         "and nothing else"
     )
-    assert shown(editor, material) == made, "whole"
+    assert editor.chosen("materials") == "worn brass" and shown(editor, "worn brass") == made, "whole"
     after = document(editor)
     assert after["textures"]["worn-color"] == before["textures"]["worn-color"] != made["base_color"]
-    assert after["materials"][material]["base_color"]["texture"] == "worn-color-2"
+    assert after["materials"]["worn brass"]["base_color"]["texture"] == "worn-color-2"
     page.keyboard.press("Control+z")
     assert document(editor) == before, "in one undo"
 
@@ -134,11 +133,11 @@ def test_a_saved_material_is_used_in_another_scene(editor: Editor, server: Serve
     page.click("#tab-materials")
     editor.act("paste-material")
     editor.wait("the copy", lambda: page.is_visible("[data-field=base_color] .texture"))
-    assert shown(editor, "subject") == made
+    assert shown(editor, "Red paint") == made
     page.keyboard.press("Control+z")
     editor.drop("#stage", {"worn.json": file})
     editor.wait("the file's", lambda: page.is_visible("[data-field=base_color] .texture"))
-    assert shown(editor, "subject") == made
+    assert shown(editor, "Red paint") == made
     server.http.delete("/v1/documents/materials/worn%20brass")
 
 
@@ -172,6 +171,6 @@ def test_a_refused_material_changes_nothing(editor: Editor, server: Server) -> N
     page.reload()
     editor.settled()
     page.get_by_role("listbox", name="Library").get_by_role("option", name="old", exact=True).click()
-    editor.wait("what is missing", lambda: "“lost” did not come" in editor.text("#messages"))
-    assert document(editor)["materials"]["subject"] == {"type": "principled", "metallic": 1}
+    editor.wait("what is missing", lambda: "“lost” could not be found" in editor.text("#messages"))
+    assert document(editor)["materials"]["old"] == {"type": "principled", "metallic": 1}
     server.http.delete("/v1/documents/materials/old")

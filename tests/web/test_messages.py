@@ -21,7 +21,7 @@ def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
     editor.act("paste-material")
     editor.wait("the refusal", lambda: editor.text("#messages"))
     said = page.inner_text("#messages strong")
-    assert said == "Roughness of material Subject must be at most 1, not 3. Another value is wrong, too."
+    assert said == "Roughness of material Red paint must be at most 1, not 3. Another value is wrong, too."
     places = """["stage", "messages", "state"].map((id) => document.getElementById(id).getBoundingClientRect())"""
     stage, text, state = page.evaluate(places)
     assert stage["left"] < text["left"] and text["right"] < stage["right"] and text["bottom"] < state["top"]
@@ -33,7 +33,7 @@ def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
     editor.act("paste-material")
     editor.wait("the refusal", lambda: editor.text("#messages"))
     said = page.inner_text("#messages strong")
-    assert said.startswith("“shine” of material Subject is not known here") and len(said) < 80
+    assert said.startswith("“shine” of material Gold is not known here") and len(said) < 80
 
 
 def test_the_newest_message_is_seen_and_goes_by_itself(editor: Editor) -> None:

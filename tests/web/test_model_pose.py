@@ -26,7 +26,7 @@ def model() -> bytes:
 def test_it_is_opened_in_the_pose_that_is_chosen(editor: Editor, model: bytes) -> None:
     editor.settled()
     page, before = editor.page, document(editor)
-    dialog = page.get_by_role("dialog", name="How is square.glb taken?")
+    dialog = page.get_by_role("dialog", name="Open square.glb as")
     editor.drop("#stage", {"square.glb": model})
     page.click("dialog[open] [value=add]")
     dialog.get_by_role("button", name="Cancel").click()

@@ -32,7 +32,7 @@ TWICE = """other = sunbox.View(scene, width=80, height=60)
 other"""
 TOLD = """import json
 print(json.dumps({"scene": {**view.scene, "shapes": None}, "seen": len(seen), "other": other.scene["camera"]}))"""
-CHANGED = 'view.update({"materials": {"subject": {"base_color": [0.02, 0.1, 0.9], "roughness": 0.2}}})'
+CHANGED = 'view.update({"materials": {"Red paint": {"base_color": [0.02, 0.1, 0.9], "roughness": 0.2}}})'
 CELLS = [BEGIN, TWICE, TOLD, CHANGED, TOLD]
 SETTINGS = {  # nothing is asked of other hosts
     "notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -190,12 +190,12 @@ def test_a_drag_orbits_and_python_sees_it(shown: Notebook) -> None:
 
 def test_a_slider_changes_the_material(shown: Notebook) -> None:
     slider = shown.view(0).get_by_role("slider", name="Roughness", exact=True)
-    before = shown.told(2)["scene"]["materials"]["subject"]["roughness"]
+    before = shown.told(2)["scene"]["materials"]["Red paint"]["roughness"]
     slider.focus()
     for _ in range(20):
         shown.page.keyboard.press("ArrowRight")
     value = float(slider.input_value())
-    shown.wait("the new value", lambda: shown.told(2)["scene"]["materials"]["subject"]["roughness"] == value)
+    shown.wait("the new value", lambda: shown.told(2)["scene"]["materials"]["Red paint"]["roughness"] == value)
     assert value > before
 
 
@@ -204,15 +204,15 @@ def test_a_number_is_written_and_what_is_refused_is_said_there(shown: Notebook) 
     trouble = shown.view(0).locator(".field .trouble:visible")
     number.fill("0.35")
     number.press("Enter")
-    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.35)
+    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["Red paint"]["roughness"] == 0.35)
     number.fill("7")
     number.press("Enter")
     trouble.wait_for()
     assert "not 7" in trouble.inner_text()
-    assert shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.35
+    assert shown.told(2)["scene"]["materials"]["Red paint"]["roughness"] == 0.35
     number.fill("0.5")
     number.press("Enter")
-    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["subject"]["roughness"] == 0.5)
+    shown.wait("the number", lambda: shown.told(2)["scene"]["materials"]["Red paint"]["roughness"] == 0.5)
     assert trouble.count() == 0
 
 
@@ -228,7 +228,7 @@ def test_a_menu_takes_a_material(shown: Notebook) -> None:
     before = shown.pixels(0)
     shown.view(0).get_by_label("Library").select_option("brass")
     shown.wait("other pixels", lambda: shown.differs(0, before))
-    material = shown.told(4)["scene"]["materials"]["subject"]
+    material = shown.told(4)["scene"]["materials"]["Red paint"]
     assert material["metallic"] == 1 and shown.view(0).get_by_label("Library").input_value() == ""
 
 
@@ -270,6 +270,6 @@ nbformat.write(book, {str(made)!r})"""
     cells = [cell for cell in json.loads(made.read_text())["cells"] if cell["cell_type"] == "code"]
     shown, _, refused, edits, picture = (cell["outputs"][-1] for cell in cells)
     assert {"application/vnd.jupyter.widget-view+json", "image/png"} <= shown["data"].keys()
-    assert "/scene/materials/subject/roughness" in "".join(refused["text"])
+    assert "/scene/materials/Red paint/roughness" in "".join(refused["text"])
     assert "".join(edits["data"]["text/plain"]) == "1" and "image/png" in picture["data"]
     assert all(cell["outputs"] == [] for cell in json.loads(EXAMPLE.read_text())["cells"] if "outputs" in cell)

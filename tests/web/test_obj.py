@@ -32,5 +32,5 @@ def test_a_zip_becomes_a_scene_with_its_materials(editor: Editor) -> None:
     assert editor.complaints == []
 
     editor.drop("#stage", {"nothing.zip": zipped({"readme.txt": "hello"})})
-    editor.wait("the refusal", lambda: "nothing.zip was not taken" in editor.text("#messages"))
+    editor.wait("the refusal", lambda: "nothing.zip could not be used" in editor.text("#messages"))
     assert not editor.differs(shown, 8), "without a model it changes nothing"

@@ -46,7 +46,12 @@ def test_what_is_deleted_leaves_the_others_hidden(page: Page) -> None:
     state = {"scene": SCENE, "chosen": chosen}
     left = call(page, "document/outline.js", "without", state, ["/shapes/0", "/shapes/2"])
     assert [shape.get("name") for shape in left["scene"]["shapes"]] == [None, "Truck/Wheels/Right"]
-    assert left["chosen"] == {"thing": "/shapes/1", "hidden": ["/shapes/1", "/lights/0"], "locked": []}
+    assert left["chosen"] == {
+        "thing": "/shapes/1",
+        "material": "a",
+        "hidden": ["/shapes/1", "/lights/0"],
+        "locked": [],
+    }
 
 
 def test_hidden_things_keep_their_numbers(page: Page) -> None:
@@ -73,8 +78,8 @@ def test_things_are_renamed_locked_and_deleted_together(editor: Editor) -> None:
     editor.wait("the box", lambda: page.locator("#outline-list [data-thing^='/shapes/']").count() == 3)
     page.click("#outline-list [data-thing='/shapes/0']", modifiers=["Control"])
     assert page.locator("#outline-list [aria-selected=true]").count() == 2
-    page.select_option("#outline-several select", "floor")
-    assert [shape["material"] for shape in document(editor)["shapes"]] == ["floor"] * 3
+    page.select_option("#outline-several select", "Floor")
+    assert [shape["material"] for shape in document(editor)["shapes"]] == ["Floor"] * 3
     page.click("#outline-several >> text=Delete")
     assert len(document(editor)["shapes"]) == 1
     page.keyboard.press("Control+z")

@@ -280,7 +280,7 @@ def test_a_table_of_colours_is_dropped_saved_and_removed(editor: Editor) -> None
     page.keyboard.press("Control+z")
     editor.wait("the table again", chip.is_visible)
     editor.drop("#stage", {"Broken.cube": b"LUT_1D_SIZE 2\n1 1\n"})
-    editor.wait("a word about it", lambda: "Broken.cube was not taken" in page.inner_text("#messages"))
+    editor.wait("a word about it", lambda: "Broken.cube could not be used" in page.inner_text("#messages"))
     assert chip.inner_text() == "Inverted.cube", "the last good one stays"
 
 

@@ -16,7 +16,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     editor.settled()
     samples = editor.samples()
     click(editor, 0.1, 0.9)
-    editor.wait("the floor", lambda: editor.chosen("materials") == "floor")
+    editor.wait("the floor", lambda: editor.chosen("materials") == "Floor")
     editor.wait("its outline", lambda: overlay(editor, "outline")[..., 3].any())
     rows = np.flatnonzero(overlay(editor, "outline")[..., 3].any(axis=1))
     outline = "document.querySelector('#outline')"
@@ -24,7 +24,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     scale = editor.page.evaluate(f"{outline}.height / ({outline}.clientHeight * devicePixelRatio)")
     assert scale == pytest.approx(1, abs=0.02), "as fine as the screen, whatever the picture is"
     click(editor, 0.5, 0.5)
-    editor.wait("the ball", lambda: editor.chosen("materials") == "subject")
+    editor.wait("the ball", lambda: editor.chosen("materials") == "Red paint")
     shown = "document.querySelector('#outline').classList.contains('shown')"
     editor.wait("its outline", lambda: editor.page.evaluate(shown))
     editor.page.wait_for_timeout(1500)
@@ -36,7 +36,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     assert editor.samples() >= samples, "picking costs no sample"
     click(editor, 0.5, 0.5)
     editor.wait("its outline", lambda: editor.page.evaluate(shown))
-    editor.page.select_option("#thing-material", "floor")
+    editor.page.select_option("#thing-material", "Floor")
     assert editor.page.evaluate(shown), "it stays while another material is prepared"
 
 
@@ -97,7 +97,7 @@ def test_layers_have_a_legend(editor: Editor, layer: str) -> None:
         near, far = (float(word) for word in legend.split() if word.replace(".", "").isdigit())
         assert 3.5 < near < far
     if layer == "material_id":
-        assert {"Subject", "Floor"} <= set(legend.split("\n"))
+        assert {"Red paint", "Floor"} <= set(legend.split("\n"))
         colors = np.unique(overlay(editor, "picture").reshape(-1, 4), axis=0)
         assert len(colors) == 3, "two materials and nothing"
     editor.tab("view")

@@ -193,7 +193,7 @@ def test_two_tabs_keep_two_works(editor: Editor, server: Server) -> None:
     def kept(tab: Editor) -> object:
         return tab.page.evaluate(
             "JSON.parse(localStorage['sunbox.work ' + sessionStorage['sunbox.tab']] ?? 'null')"
-            "?.scene.materials.subject.type"
+            "?.scene.materials['Red paint'].type"
         )
 
     def work(tab: Editor, model: str) -> None:
@@ -224,7 +224,7 @@ def test_json_leaves_and_comes_back(editor: Editor) -> None:
     before = editor.settled()
     scene = editor.shot("#download-scene")
     document = json.loads(scene)
-    document["materials"]["subject"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}
+    document["materials"]["Red paint"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}
     editor.drop("#stage", {"green.json": json.dumps(document).encode()})
     editor.page.click("dialog[open] [value=open]")
     editor.wait_for_change(before)
@@ -232,8 +232,8 @@ def test_json_leaves_and_comes_back(editor: Editor) -> None:
     editor.page.click("dialog[open] [value=open]")
     editor.wait("the old scene", lambda: not editor.differs(before, 8))
     editor.drop("#stage", {"note.txt": b"hello"})
-    editor.wait("a refusal", lambda: "note.txt was not taken" in editor.text("#messages"))
-    assert "Sunbox reads .gltf, .glb, " in editor.text("#messages"), "what would be right is said"
+    editor.wait("a refusal", lambda: "note.txt could not be used" in editor.text("#messages"))
+    assert "Sunbox can open .gltf, .glb, " in editor.text("#messages"), "what would be right is said"
 
 
 def test_dropped_files_find_their_places(editor: Editor) -> None:
@@ -263,7 +263,7 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
     editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
-    editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))
+    editor.wait("a refusal", lambda: "broken.glb could not be used" in editor.text("#messages"))
     assert editor.page.locator("dialog[open]").count() == 0, "nothing is asked about what cannot be read"
 
 

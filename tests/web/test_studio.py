@@ -31,21 +31,21 @@ def names(editor: Editor, listbox: str) -> list[str]:
 
 def test_materials_are_pictures_on_the_shelf(editor: Editor) -> None:
     page = editor.page
-    assert names(editor, "Materials") == ["subject", "floor"]
+    assert names(editor, "Materials") == ["Red paint", "Floor"]
     own = page.get_by_role("listbox", name="Materials", exact=True)
     assert own.get_by_role("option").locator("img").count() == 2
     page.get_by_role("button", name="New material").click()
     page.get_by_role("button", name="Duplicate material").click()
-    assert names(editor, "Materials") == ["subject", "floor", "material", "material-2"]
-    assert own.get_by_role("option", selected=True).get_attribute("aria-label") == "material-2"
-    own.get_by_role("option", name="floor").dblclick()
+    assert names(editor, "Materials") == ["Red paint", "Floor", "Material", "Material 2"]
+    assert own.get_by_role("option", selected=True).get_attribute("aria-label") == "Material 2"
+    own.get_by_role("option", name="Floor").dblclick()
     page.fill(".naming .entry", "ground")
     page.keyboard.press("Enter")
     editor.wait("the name", lambda: "ground" in names(editor, "Materials"))
     assert document(editor)["shapes"][1]["material"] == "ground"
-    own.get_by_role("option", name="material", exact=True).click()
+    own.get_by_role("option", name="Material", exact=True).click()
     page.keyboard.press("Delete")
-    editor.wait("its end, as nothing was made of it", lambda: "material" not in names(editor, "Materials"))
+    editor.wait("its end, as nothing was made of it", lambda: "Material" not in names(editor, "Materials"))
     assert len(document(editor)["shapes"]) == 2, "the things stay"
 
 
@@ -61,7 +61,7 @@ def test_the_library_is_sifted_and_assigned_by_keys(editor: Editor) -> None:
     assert names(editor, "Library") == ["Gold", "Gold (Physically Based)"]
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
-    editor.wait("gold", lambda: document(editor)["materials"]["subject"].get("metallic") == 1)
+    editor.wait("gold", lambda: document(editor)["materials"].get("Gold", {}).get("metallic") == 1)
     assert library.get_by_role("option", selected=True).get_attribute("aria-label") == "Gold"
 
 
@@ -122,12 +122,19 @@ def test_the_inspector_follows_the_selection(editor: Editor) -> None:
     assert shown() == ["thing", "film"]
     page.click("#outline-list [data-thing='/environment']")
     assert shown() == ["thing"]
-    editor.pick("materials", "floor")
+    editor.pick("materials", "Floor")
     assert shown() == ["material", "thing"] and editor.text("#thing-title") == "Quad"
     page.get_by_role("button", name="Duplicate material").click()
-    page.select_option("#thing-material", "floor")
-    editor.pick("materials", "floor-2")
-    assert shown() == ["material"], "of which nothing is made"
+    page.select_option("#thing-material", "Floor")
+    editor.pick("materials", "Floor 2")
+    assert editor.text("#material-users") == "On nothing yet" and editor.text("#thing-title") == "Quad"
+    page.get_by_role("button", name="Put on Quad").click()
+    assert document(editor)["shapes"][1]["material"] == "Floor 2" and page.is_hidden("#put-on")
+    assert editor.text("#material-users") == "On Quad"
+    page.keyboard.press("Control+z")
+    page.click("#outline-list [data-thing='/camera']")
+    editor.pick("materials", "Floor 2")
+    assert shown() == ["material"], "nothing is made of it, and no thing is selected"
 
 
 def test_scenes_and_environments_are_pictures(editor: Editor) -> None:
@@ -159,7 +166,7 @@ def test_the_pill_says_how_far_the_picture_is(editor: Editor) -> None:
     editor.wait("a pause", lambda: "Paused" in state.inner_text())
     page.get_by_role("button", name="Resume").click()
     page.get_by_role("button", name="More about the picture").click()
-    assert "Per second" in editor.text("#readings")
+    assert "Samples per second" in editor.text("#readings")
 
 
 def test_what_the_header_opens(editor: Editor) -> None:
@@ -282,4 +289,4 @@ def test_no_list_grows_with_what_is_looked_at(editor: Editor) -> None:
         editor.pick("scenes", scene)
         editor.wait("the scene", lambda name=scene: editor.chosen("scenes") == name)
     editor.page.click("#tab-materials")
-    assert names(editor, "Materials") == ["subject", "floor"]
+    assert names(editor, "Materials") == ["Red paint", "Floor"]

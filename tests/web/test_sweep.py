@@ -53,7 +53,7 @@ def sweep(editor: Editor, name: str) -> None:
 
 
 def material(editor: Editor) -> Any:
-    return document(editor)["materials"]["subject"]
+    return document(editor)["materials"]["Red paint"]
 
 
 def focused(page: Page) -> str:
@@ -156,13 +156,13 @@ def test_the_keyboard_is_enough(editor: Editor) -> None:
 def test_a_refusal_is_put_in_words(editor: Editor) -> None:
     page = editor.page
     refusal = """{"type": "about:blank", "title": "Unprocessable", "status": 422, "errors": [{"pointer":
-        "/over/0/values/3", "detail": "/scene/materials/subject/roughness: must be at most 0.5"}]}"""
+        "/over/0/values/3", "detail": "/scene/materials/Red paint/roughness: must be at most 0.5"}]}"""
     headers = {"content-type": "application/problem+json"}
     page.route("**/v1/batches", lambda route: route.fulfill(status=422, headers=headers, body=refusal))
     sweep(editor, "roughness")
     said = page.locator(".sweeping [role=alert]")
     said.wait_for()
-    assert said.inner_text() == "Roughness of material Subject must be at most 0.5."
+    assert said.inner_text() == "Roughness of material Red paint must be at most 0.5."
     page.keyboard.press("Escape")
     assert page.locator(".sweeping").count() == 0
 

@@ -53,7 +53,7 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     editor.settled()
     assert editor.text("#messages") == ""
     document = json.loads(editor.shot("#download-scene"))
-    assert document["materials"]["subject"]["base_color"] == {"texture": "halves", "factor": [0.5, 0.5, 0.5]}
+    assert document["materials"]["Red paint"]["base_color"] == {"texture": "halves", "factor": [0.5, 0.5, 0.5]}
     lies = {key: value for key, value in document["textures"]["halves"].items() if key != "asset"}
     assert lies == {"wrap": "mirror", "color_space": "linear", "rotation": 30, "scale": [3, 1]}
 
@@ -73,7 +73,7 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
         editor.wait("the texture", lambda name=parameter: page.is_visible(f"[data-field={name}] .beneath"))
     page.click(f"{BENEATH} > summary")
     shared = f"{BENEATH} > p"
-    assert editor.text(shared) == "How it lies holds for all 2 parameters that show halves."
+    assert editor.text(shared) == "This changes all 2 parameters that use halves."
     turn = page.locator(f"{BENEATH} [data-field=rotation] input.number")
     turn.fill("30")
     turn.press("Enter")
@@ -88,7 +88,7 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
     assert page.is_hidden(shared), "nothing else shows the other image"
     assert float(turn.input_value()) == 30
     document = json.loads(editor.shot("#download-scene"))
-    coat, textures = document["materials"]["subject"], document["textures"]
+    coat, textures = document["materials"]["Red paint"], document["textures"]
     assert coat["base_color"] == {"texture": "other", "channel": "r", "factor": [0.5, 0.5, 0.5]}
     assert coat["roughness"] == {"texture": "halves"}
     assert textures["other"]["rotation"] == textures["halves"]["rotation"] == 30
@@ -164,7 +164,7 @@ def test_textures_are_used_again_and_checkers_made(editor: Editor) -> None:
     editor.wait("the server's picture of it", lambda: page.get_attribute("#stage", "aria-busy") == "false")
     assert page.locator(".message.refusal").count() == 0
     document = json.loads(editor.shot("#download-scene"))
-    coat = document["materials"]["subject"]
+    coat = document["materials"]["Red paint"]
     assert [coat[name]["texture"] for name in ("base_color", "roughness", "metallic")] == [
         "halves",
         "checker",
@@ -183,7 +183,7 @@ def test_a_materials_picture_shows_its_texture(editor: Editor) -> None:
         const over = [...data.keys()].filter((i) => i % 4 === 0).map((i) => data[i + 1] - data[i]);
         return [Math.max(...over), Math.min(...over)];
     }"""
-    ball = page.locator("#materials [data-value=subject] img")
+    ball = page.locator("#materials [data-value='Red paint'] img")
     assert ball.evaluate(greens)[0] < 0, "it is red"
     editor.drop("#material-form [data-field=base_color]", {"halves.png": halves(left=(0, 220, 0))})
     editor.wait("the texture", lambda: page.is_visible(BENEATH))
@@ -216,3 +216,9 @@ def test_a_ramp_over_noise_is_made_by_hand(editor: Editor) -> None:
     assert noise == {"type": "noise", "octaves": 2} and ramp["input"] == {"texture": "noise"}
     assert [stop["position"] for stop in ramp["stops"]] == [0.5, 1]
     assert editor.text("#messages") == ""
+    for count in (3, 2):  # undone while the form stands open
+        page.keyboard.press("Control+z")
+        editor.wait("the stops of before", lambda n=count: page.locator(f"{BENEATH} [role=group]").count() == n)  # type: ignore[misc]
+    page.keyboard.press("Control+Shift+z")
+    editor.wait("the third stop again", lambda: page.locator(f"{BENEATH} [role=group]").count() == 3)
+    assert editor.complaints == []

@@ -87,7 +87,7 @@ def model() -> bytes:
     file = gltf_files.Gltf()
     pixels = np.full((4, 4, 3), (0, 200, 0), np.uint8)
     texture = {"baseColorTexture": {"index": file.texture(pixels)}}
-    file.of({"name": "subject", "pbrMetallicRoughness": texture})
+    file.of({"name": "Red paint", "pbrMetallicRoughness": texture})
     lamp = {"type": "point", "color": [1, 1, 1], "intensity": 10}
     file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [lamp]}}
     file.tree["extensionsUsed"] = ["KHR_lights_punctual"]
@@ -112,8 +112,8 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
     said = page.text_content("#messages") or ""
     assert "Its light was left out" in said and "sky" not in said, "that concerns who opens it"
     before = document(editor)
-    assert list(before["materials"]) == ["subject", "floor", "subject-2"]
-    assert before["shapes"][2]["material"] == "subject-2" and "lights" not in before
+    assert list(before["materials"]) == ["Red paint", "Floor", "Red paint 2"]
+    assert before["shapes"][2]["material"] == "Red paint 2" and "lights" not in before
     low = before["shapes"][2]["transform"]["translate"]
     assert low[0] > 1.9, "beside the ball"
     editor.wait("a picture", lambda: page.get_attribute("#stage", "aria-busy") == "false")

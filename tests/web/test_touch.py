@@ -61,7 +61,7 @@ def test_a_finger_that_scrolls_the_panel_moves_no_slider(phone: tuple[Editor, Sw
 def test_a_finger_pulls_a_material_onto_a_thing(phone: tuple[Editor, Swipe]) -> None:
     editor, swipe = phone
     page = editor.page
-    ball = "#materials [data-value=subject]"
+    ball = "#materials [data-value='Red paint']"
     editor.settled()
     second = page.locator("#library [role=option]:nth-child(2)")
     before = second.bounding_box()
@@ -77,7 +77,7 @@ def test_a_finger_pulls_a_material_onto_a_thing(phone: tuple[Editor, Swipe]) -> 
     def is_taken() -> bool:
         swipe(ball, stage["x"] + 8 - tile["x"] - 0.8 * tile["width"], floor)
         page.wait_for_timeout(500)
-        return editor.text("#material-users") == "Sphere and Quad are made of it."
+        return editor.text("#material-users") == "On Quad and Sphere"
 
     editor.wait("the floor to take it", is_taken)
     assert page.locator(".pulled").count() == 0

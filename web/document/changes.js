@@ -11,8 +11,7 @@ const differing = (before, after) =>
   [...new Set([before ?? {}, after ?? {}].flatMap(Object.keys))].filter((key) => !equal(before?.[key], after?.[key]));
 
 // The name of the one thing or material that differs, or else of all that does: "Gold", "the view", "the change".
-// `materialTitle(name)` is what a material of `after` is called.
-export function changed(before, after, materialTitle = inWords) {
+export function changed(before, after) {
   const parts = differing(before, after).filter((part) => part !== "textures");
   const own = (part) => differing(before?.[part], after[part]);
   // A thing that only wears another material is about that one.
@@ -22,7 +21,7 @@ export function changed(before, after, materialTitle = inWords) {
     const wearing = new Set(after.shapes.map(({ material }) => material));
     const names = [...own("materials"), ...worn.map(([, is]) => is.material)].filter((name) => wearing.has(name));
     const [name, ...others] = [...new Set(names)];
-    if (name !== undefined && !others.length) return materialTitle(name);
+    if (name !== undefined && !others.length) return inWords(name);
   }
   if (parts.length === 1) {
     const [part] = parts;

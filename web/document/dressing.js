@@ -1,22 +1,49 @@
-// A thing is made of another material: one of the scene ({name}), or one that comes from elsewhere ({document, wanted}),
-// bare or with its textures. A thing that has its material for itself keeps that one's name; one that shares it gets one
-// of its own, named as is wished for.
+// Things are made of another material: one of the scene ({name}), or one that comes from elsewhere ({document, wanted}),
+// bare or with its textures. That one has the name that is wished for, or a free one like it. It takes the place of a
+// material that nothing else is made of; the same material again, as it came, is not there twice.
 
-import { fresh, isShared } from "./materials.js";
+import { exchanged, fresh, users, wearing } from "./materials.js";
 import { received, unpacked, withTextures } from "./material-set.js";
-import { at, pointer, put } from "../lib/patch.js";
+import { at, equal, pointer, put } from "../lib/patch.js";
 
-// {scene, material, arrival, lost}: the scene with it, and its name there; `arrival` as `withdrawn` takes it and `lost`
-// as `received` says it of what comes from elsewhere.
-export function dressed(state, thing, { name, document, wanted }) {
-  const { scene } = state;
-  if (document === undefined)
-    return { scene: put(scene, `${thing}/material`, name), material: name, arrival: null, lost: [] };
-  const was = at(scene, thing).material;
+// {scene, compare, material, arrival, lost}: the scene with it on some things, and its name there; `arrival` as
+// `withdrawn` takes it and `lost` as `received` says it of what comes from elsewhere. `was`: the material that it is to
+// replace, where no thing is named.
+export function dressed(state, things, { name, document, wanted }, was = at(state.scene, things[0]).material) {
+  const { scene, compare } = state;
+  const none = { arrival: null, lost: [] };
+  if (document === undefined) return { scene: wearing(scene, things, name), compare, material: name, ...none };
+  const isReplaced = users(scene, was).every((i) => things.includes(pointer("shapes", i)));
   const { material, textures, added, lost } = received(scene, unpacked(document)[0]);
-  const given = isShared(state, thing) ? fresh(wanted, scene.materials) : was;
-  const place = pointer("materials", given);
-  const made = put(put(withTextures(scene, textures), place, material), `${thing}/material`, given);
-  const arrival = { place: `/scene${place}`, before: at(scene, place), material, added, thing, was };
-  return { scene: made, material: given, arrival, lost };
+  const isCompared = isReplaced && compare?.material === was; // its variant B goes with it, under its new name
+  const known = added.length || isCompared ? undefined : alike(scene, wanted, material);
+  if (known !== undefined) {
+    const next = isReplaced && known !== was ? exchanged(state, was, known).scene : scene;
+    return { scene: wearing(next, things, known), compare, material: known, ...none, lost };
+  }
+  const { [was]: before, ...others } = scene.materials;
+  const given = fresh(wanted, isReplaced ? others : scene.materials);
+  const textured = withTextures(scene, textures);
+  const next = isReplaced
+    ? exchanged({ ...state, scene: textured }, was, given, material)
+    : { scene: put(textured, pointer("materials", given), material), compare };
+  const place = pointer("scene", "materials", given);
+  const arrival = { place, before: isReplaced ? before : undefined, material, added, name: given, was };
+  return { scene: wearing(next.scene, things, given), compare: next.compare, material: given, arrival, lost };
+}
+
+// The name of a material of the scene that came under such a name, and is still what it was; undefined where none is.
+const alike = ({ materials }, wanted, material) =>
+  Object.keys(materials).find((name) => {
+    const rest = name.startsWith(wanted) ? name.slice(wanted.length) : null;
+    return rest !== null && /^([- ]\d+)?$/.test(rest) && equal(materials[name], material);
+  });
+
+// A state without a material that had come to a place: {place, before, added} as it was put there, and {name, was} where
+// it came under a name of its own.
+export function withdrawn(state, { place, before, added, name, was }) {
+  const back = name === undefined ? put(state, place, before) : { ...state, ...exchanged(state, name, was, before) };
+  const { textures, ...scene } = back.scene;
+  const left = Object.entries(textures ?? {}).filter(([each]) => !added.includes(each));
+  return { ...back, scene: withTextures(scene, Object.fromEntries(left)) };
 }

@@ -5,10 +5,11 @@
 import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
-import { dressed } from "./dressing.js";
+import { dressed, withdrawn } from "./dressing.js";
 import { exposed } from "./lighting.js";
 import { isFlat } from "./bounds.js";
-import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
+import { carried, missingWords, received, unpacked, withTextures } from "./material-set.js";
+import { isShape, selectedWith, users } from "./materials.js";
 import { filesFor, modelOfFile } from "./model-files.js";
 import { inWords } from "../lib/format-text.js";
 import { at, pointer, put } from "../lib/patch.js";
@@ -197,15 +198,9 @@ export class Editor extends Store {
     return at(this.state, this.materialPlace);
   }
 
-  // With the first thing that is made of it, unless one is selected already; alone where nothing is.
   pickMaterial(material) {
-    const { scene, chosen } = this.state;
-    const isOf = ({ material: each }) => each === material;
-    const shape = scene.shapes.findIndex(isOf);
-    const isSelected = chosen.thing.startsWith("/shapes/") && isOf(at(scene, chosen.thing) ?? {});
-    const first = shape < 0 ? pointer("materials", material) : pointer("shapes", shape);
-    const thing = isSelected ? chosen.thing : first;
-    this.amend({ chosen: { ...this.state.chosen, material, thing } });
+    const { chosen } = this.state;
+    this.amend({ chosen: { ...chosen, material, thing: selectedWith(this.state, material) } });
   }
 
   // The material in hand, with the textures that it shows.
@@ -214,30 +209,38 @@ export class Editor extends Store {
     return carried(chosen.material, this.material, scene);
   }
 
-  // Another material in the place of the one in hand, bare or with its textures, which may have a title where it comes
-  // from. It comes whole or, if the server refuses any of it, not at all.
-  putMaterial(document, title = null) {
+  // Another material in the place of the one in hand, bare or with its textures, under the same name. It comes whole or,
+  // if the server refuses any of it, not at all.
+  putMaterial(document) {
     const place = this.materialPlace;
     const { material, textures, added, lost } = received(this.state.scene, unpacked(document)[0]);
-    this.#arrival = { place, before: this.material, material, added, title };
+    this.#arrival = { place, before: this.material, material, added };
     const { scene } = this.state;
     this.change(put({ ...this.state, scene: withTextures(scene, textures) }, place, material));
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
-  // A thing gets a material, as `dressed` has it.
-  dress(thing, what) {
-    const { scene, material, arrival, lost } = dressed(this.state, thing, what);
-    this.#arrival = arrival && { ...arrival, title: what.title ?? null };
-    this.change({ scene, chosen: { ...this.state.chosen, thing, material } });
+  // Things get a material, as `dressed` has it; without any it comes in the place of the one in hand.
+  dress(things, what) {
+    const { chosen } = this.state;
+    const was = things.length ? undefined : chosen.material;
+    const { scene, compare, material, arrival, lost } = dressed(this.state, things, what, was);
+    this.#arrival = arrival;
+    const thing = things.includes(chosen.thing) ? chosen.thing : (things[0] ?? selectedWith({ scene, chosen }, material));
+    this.change({ scene, compare, chosen: { ...chosen, thing, material } });
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
-  // What a material is called: as it was where it came from, if it came last.
-  titleOfMaterial(name) {
-    const { place, material, title } = this.#arrival ?? {};
-    const isArrival = title && place === pointer("scene", "materials", name) && at(this.state, place) === material;
-    return isArrival ? title : inWords(name);
+  // What is selected gets a material from the library, under its name there. In a comparison the variant in hand does, and
+  // where nothing is selected that is made of any, all that is made of the one in hand.
+  assign(document, wanted) {
+    const { scene, chosen } = this.state;
+    const isCompared = this.compared?.material === chosen.material;
+    if (isCompared && this.compared.side === "b") return this.putMaterial(document);
+    const selected = this.selection.includes(chosen.thing) ? this.selection : [chosen.thing];
+    const things = isCompared ? [] : selected.filter(isShape);
+    const worn = users(scene, chosen.material).map((i) => pointer("shapes", i));
+    this.dress(things.length ? things : worn, { document, wanted });
   }
 
   pickModel(type) {

@@ -2,7 +2,7 @@
 // where it shows none, else {materials: {NAME: material}, textures: {NAME: texture}}.
 
 import { fresh } from "./materials.js";
-import { at, equal, isObject, put } from "../lib/patch.js";
+import { equal, isObject } from "../lib/patch.js";
 
 const shows = (value) => isObject(value) && typeof value.texture === "string";
 
@@ -79,20 +79,6 @@ export function received(scene, { material, textures: carriedOnes }) {
 // The scene with these textures, which it has no table for where there are none.
 export const withTextures = (scene, textures) => (Object.keys(textures).length ? { ...scene, textures } : scene);
 
-// A state without a material that had come to a place: {place, before, added} as it was put there, and {thing, was}
-// where a thing got it in the place of another one.
-export function withdrawn(state, { place, before, added, thing, was }) {
-  const undressed = thing && at(state.scene, thing) ? put(state, `/scene${thing}/material`, was) : state;
-  const { textures, ...scene } = put(undressed, place, before).scene;
-  const left = Object.entries(textures ?? {}).filter(([name]) => !added.includes(name));
-  const { chosen } = state;
-  return {
-    ...put(undressed, place, before),
-    scene: withTextures(scene, Object.fromEntries(left)),
-    chosen: scene.materials[chosen.material] ? chosen : { ...chosen, material: was },
-  };
-}
-
 // What the picture of a material depends on; the same as `before` where nothing of it is another object.
 export function pictured(material, { textures = {} }, before = []) {
   const now = [material, ...texturesOf(material, textures).map((name) => textures[name])];
@@ -100,5 +86,5 @@ export function pictured(material, { textures = {} }, before = []) {
 }
 
 export const missingWords = (names) =>
-  `${names.map((name) => `“${name}”`).join(", ")} did not come with the material, which was saved without its textures. ` +
-  "What showed them has its default.";
+  `${names.map((name) => `“${name}”`).join(", ")} could not be found: the material was saved without its textures. ` +
+  "Those parameters have their defaults.";

@@ -1,7 +1,7 @@
 // The outline of a scene: a tree by the names of things, which are paths; and what is done to several things at once.
 // `chosen.hidden` and `chosen.locked` are lists of things. Functions give the members of the state that change.
 
-import { pointer, put } from "../lib/patch.js";
+import { at, pointer, put } from "../lib/patch.js";
 import { things } from "./things.js";
 
 const unseen = (name) => `${name} (hidden)`; // the material of what is hidden
@@ -84,9 +84,10 @@ export function without({ scene, chosen }, gone) {
   const before = gone.filter((each) => each.startsWith(`/${kind}/`) && Number(each.split("/")[2]) < Number(index));
   const next = rest.length ? pointer(kind, Math.min(Number(index) - before.length, rest.length - 1)) : "/camera";
   const { hidden = [], locked = [] } = chosen;
+  const material = at({ shapes }, next)?.material ?? chosen.material; // the inspector goes on with what is selected
   return {
     scene: { ...scene, shapes, ...(scene.lights ? { lights } : {}) },
-    chosen: { ...chosen, thing: next, hidden: moved(hidden, gone), locked: moved(locked, gone) },
+    chosen: { ...chosen, thing: next, material, hidden: moved(hidden, gone), locked: moved(locked, gone) },
   };
 }
 

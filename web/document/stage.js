@@ -55,7 +55,7 @@ export async function staged(acts, boxes, kind) {
   const before = scene.shapes[at];
   if (kind === "none") return before ? bare(acts.state, at) : {};
   const around = bodies.length ? union(bodies) : inView(acts.camera);
-  const material = before?.material ?? fresh("stage", scene.materials);
+  const material = before?.material ?? fresh(preset ? "Backdrop" : "Ground", scene.materials);
   const own = preset ? preset.materials[preset.shapes[0].material] : acts.plainMaterial;
   const made = preset
     ? cycloramaUnder(preset.shapes[0], around, acts.camera, material)
@@ -75,8 +75,7 @@ function bare({ scene, chosen }, at) {
   const [first] = left.scene.shapes;
   if (!first || users(left.scene, material).length) return first ? left : {};
   const { [material]: _, ...materials } = scene.materials;
-  const hand = chosen.material === material ? first.material : chosen.material;
-  return { scene: { ...left.scene, materials }, chosen: { ...left.chosen, material: hand } };
+  return { scene: { ...left.scene, materials }, chosen: left.chosen };
 }
 
 // A box that the picture shows the middle of.
@@ -91,7 +90,7 @@ export function grounded(document, { low, high }, material) {
   const isRoom = document.camera.position.every((x, k) => low[k] < x && x < high[k]);
   const isGround = document.shapes.some((shape) => isFlat(shape) || GROUND.test(shape.name ?? ""));
   if (isRoom || isGround || tall < TALL * Math.max(wide, deep) || !document.shapes.length) return document;
-  const name = fresh("stage", document.materials);
+  const name = fresh("Ground", document.materials);
   return {
     ...document,
     shapes: [...document.shapes, groundUnder({ low, high }, name)],

@@ -49,7 +49,7 @@ export class TextureForm {
     for (const part of [...this.#own, this.#ramp]) part?.show(at(this.acts.state, part.place) ?? {});
     const count = users(scene, value.texture);
     this.shared.hidden = count < 2;
-    this.shared.textContent = `How it lies holds for all ${count} parameters that show ${value.texture}.`;
+    this.shared.textContent = `This changes all ${count} parameters that use ${value.texture}.`;
   }
 
   // The forms that are shown now, each with its place, those inside of others first.

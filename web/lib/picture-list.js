@@ -135,7 +135,7 @@ export class PictureList {
     }
     stop ??= this.#options.get(this.#shown[0])?.node;
     if (stop) this.#stop(stop);
-    if (isOther && stop?.checkVisibility()) reveal(this.root, stop);
+    if (isOther && chosen !== null && stop?.checkVisibility()) reveal(this.root, stop);
   }
 }
 

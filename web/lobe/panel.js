@@ -271,7 +271,7 @@ export class LobePanel {
     this.colors.row.hidden = !this.#view.hasChannels;
     this.colors.box.checked = channels === "rgb";
     this.replaced.hidden = !replaced.length;
-    this.replaced.textContent = `Without a surface there are no images: the mean stands for that of ${replaced.map((title) => title.toLowerCase()).join(", ")}.`;
+    this.replaced.textContent = `The plot uses the average of the images of ${replaced.map((title) => title.toLowerCase()).join(", ")}.`;
     this.plot.classList.toggle("turns", Boolean(this.#view.turns));
     this.plot.classList.toggle("aims", this.#view === polar);
     this.plot.classList.toggle("tall", this.#view === terms);

@@ -96,8 +96,8 @@ export class Carrier {
     this.#end();
     try {
       const thing = await this.#thingAt(place);
-      if (thing) this.acts.dress(thing, await what);
-      else this.say("Nothing is there that could be made of it.");
+      if (thing) this.acts.dress([thing], await what);
+      else this.say("There is no thing there to put the material on.");
     } catch (problem) {
       this.acts.complain(problem);
     }

@@ -9,7 +9,7 @@ const SWITCHES = {
   denoised: "Denoised while it is noisy",
   histogram: "Histogram",
   clipping: "Clipped pixels",
-  checker: "Checker behind alpha",
+  checker: "Checker behind transparency",
   guides: "Guides",
   target: "What the camera looks at",
 };

@@ -18,7 +18,7 @@ function linesOf(lost, titles) {
   const lines = [...byDetail.values()].map((loss) => lossText(loss, titles));
   if (lines.length <= MOST) return lines;
   const more = lines.length - MOST;
-  return [...lines.slice(0, MOST), `And ${more} more ${more === 1 ? "kind" : "kinds"} of loss.`];
+  return [...lines.slice(0, MOST), `And ${more} more.`];
 }
 
 // `acts`: title(), scene(), titles() of fields, messages, announce(text).
@@ -27,11 +27,11 @@ export async function exportFile(format, acts) {
   saveAs(blob, sceneFile(acts.title(), ending));
   if (!lost.length) {
     acts.messages.hide("export");
-    return acts.announce("Exported. Nothing is lost.");
+    return acts.announce("Exported, with nothing lost.");
   }
   acts.messages.show("export", {
     title: "Exported.",
-    detail: "This format has no place for some of the scene:",
+    detail: "This format cannot hold some of the scene:",
     list: linesOf(lost, acts.titles()),
   });
 }

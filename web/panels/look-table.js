@@ -36,7 +36,7 @@ export class LookTable {
       "×",
     );
     this.chip = element("div", { class: "texture", hidden: true }, other, forget);
-    const hint = "Displayed colours go through it last.";
+    const hint = "A look that the picture's colours go through last.";
     this.element = element(
       "div",
       { class: "field", "data-field": "lut", title: hint },

@@ -1,14 +1,14 @@
-// The buttons around the list of the scene's materials, and the line that says what is made of the one in hand.
+// The buttons around the list of the scene's materials, what the one in hand is on, and the button that puts it on the
+// selected thing where that is made of another one.
 
 import { pictured } from "../document/material-set.js";
 import * as materials from "../document/materials.js";
 import { things } from "../document/things.js";
 import { watchMenu } from "../lib/menu.js";
-import { pointer } from "../lib/patch.js";
+import { at, pointer } from "../lib/patch.js";
 import { watchToolbar } from "../lib/tabs.js";
-import { sentence } from "../lib/format-text.js";
 
-const MOST_NAMED = 2; // things that are named; more are counted
+const MOST_NAMED = 2; // things that are named; of more, one is
 
 // `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, set, isWorn)` puts in its
 // picture.
@@ -19,11 +19,12 @@ export class MaterialPanel {
   constructor(find, { acts, say, paint }) {
     Object.assign(this, { find, acts, say, paint });
     const clicks = {
-      "new-material": () => this.#add((state) => materials.added(state, "material", acts.plainMaterial)),
+      "new-material": () => this.#add((state) => materials.added(state, "Material", acts.plainMaterial)),
       "duplicate-material": () => this.#copy(),
       "own-material": () => this.#copy(),
       "rename-material": () => this.rename(this.#name),
       "delete-material": () => this.remove(this.#name),
+      "put-on": () => acts.dress([acts.state.chosen.thing], { name: this.#name }),
     };
     for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
     find("material-name").addEventListener("dblclick", ({ target }) => this.rename(this.#name, target));
@@ -38,7 +39,7 @@ export class MaterialPanel {
 
   #add(make) {
     this.acts.change(make(this.acts.state));
-    this.say(`${this.#name}: ${this.#users()}`);
+    this.say(`${this.#name}: ${this.#worn().words}`);
   }
 
   #copy() {
@@ -76,27 +77,38 @@ export class MaterialPanel {
         ? others[0]
         : await askWhich({
             title: `Delete ${name}?`,
-            detail: count === 1 ? "One thing is made of it." : `${count} things are made of it.`,
-            label: count === 1 ? "It gets" : "They get",
+            detail: count === 1 ? "It is on one thing." : `It is on ${count} things.`,
+            label: "Replace it by",
             options: others.map((value) => ({ value, title: value })),
             action: "Delete",
           });
     if (instead !== null) this.acts.change(materials.removed(this.acts.state, name, instead));
   }
 
-  // What is made of the material in hand.
-  #users() {
-    const { scene } = this.acts.state;
-    const found = materials.users(scene, this.#name);
-    if (!found.length) return "nothing is made of it yet";
-    if (found.length > MOST_NAMED) return `${found.length} things are made of it`;
+  // What the material in hand is on, the selected thing first: {words, all}.
+  #worn() {
+    const { scene, chosen } = this.acts.state;
     const titles = new Map(things(scene).map(({ thing, title }) => [thing, title]));
-    return `${found.map((i) => titles.get(pointer("shapes", i))).join(" and ")} ${found.length > 1 ? "are" : "is"} made of it`;
+    const worn = materials.users(scene, this.#name).map((i) => pointer("shapes", i));
+    const isSelected = worn.includes(chosen.thing);
+    const ordered = isSelected ? [chosen.thing, ...worn.filter((thing) => thing !== chosen.thing)] : worn;
+    const [first, ...rest] = ordered.map((thing) => titles.get(thing));
+    if (first === undefined) return { words: "On nothing yet", all: "" };
+    const others = rest.length < MOST_NAMED ? rest : [`${rest.length} more`];
+    return { words: `On ${[first, ...others].join(" and ")}`, all: [first, ...rest].join(", ") };
   }
 
   show({ scene, chosen }) {
     this.find("material-name").textContent = this.#name;
-    this.find("material-users").textContent = `${sentence(this.#users())}.`;
+    const { words, all } = this.#worn();
+    this.find("material-users").textContent = words;
+    this.find("material-users").title = all;
+    const isOther = materials.isShape(chosen.thing) && at(scene, chosen.thing).material !== this.#name;
+    this.find("put-on").hidden = !isOther;
+    if (isOther) {
+      const { title } = things(scene).find(({ thing }) => thing === chosen.thing);
+      this.find("put-on").textContent = `Put on ${title}`;
+    }
     this.find("own-material").hidden = !materials.isShared({ scene }, chosen.thing);
     this.find("delete-material").disabled = Object.keys(scene.materials).length < 2;
     const now = pictured(this.acts.material, scene, this.#painted);

@@ -250,15 +250,7 @@ export class Outliner {
       "select",
       {
         "aria-label": "Material of all that is selected",
-        onchange: ({ target }) =>
-          this.acts.change({
-            scene: {
-              ...scene,
-              shapes: scene.shapes.map((shape, i) =>
-                this.#selected.has(`/shapes/${i}`) ? { ...shape, material: target.value } : shape,
-              ),
-            },
-          }),
+        onchange: ({ target }) => this.acts.dress(shapes, { name: target.value }),
       },
       element("option", { value: "", disabled: true, selected: true }, "Material…"),
       ...Object.keys(scene.materials).map((name) => element("option", { value: name }, name)),

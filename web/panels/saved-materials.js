@@ -2,7 +2,7 @@
 
 import * as api from "../server/api.js";
 
-export const WHOSE = "Everybody who uses this server has it, and this cannot be undone.";
+export const WHOSE = "Everybody who uses this server sees it there, and this cannot be undone.";
 
 export class SavedMaterials {
   entries = []; // {name, title}
@@ -40,7 +40,7 @@ export class SavedMaterials {
       const { ask, askName } = await import("../lib/ask.js");
       const { materialSet, state } = this.acts;
       const wanted = await askName({
-        title: "Save the material on the server",
+        title: "Save to Mine",
         label: "Name",
         value: state.chosen.material,
         action: "Save",

@@ -82,7 +82,7 @@ export class SceneMenu {
     });
     this.list = element("ul", { class: "kept" });
     return this.#group(
-      "Save on the server",
+      "Saved scenes",
       element(
         "div",
         { class: "row" },
@@ -140,7 +140,7 @@ export class SceneMenu {
     this.shots = element("div", { class: "snapshots" });
     return this.#group(
       "Snapshots",
-      element("p", { class: "note" }, "The picture with its settings, kept in this browser."),
+      element("p", { class: "note" }, "The scene as it is now, kept in this browser."),
       element(
         "div",
         { class: "row" },

@@ -169,15 +169,17 @@ export class Shelf {
     return this.#materials.get(value);
   }
 
+  // What it is called in a scene.
   #titleOf(value) {
     const saved = this.saved?.entries.find(({ name }) => `${SAVED} ${name}` === value);
-    const { title } = saved ?? this.library.materials.find(({ name }) => name === value) ?? {};
-    return title ? short(title) : null;
+    if (saved) return saved.title;
+    const known = this.library.materials.find(({ name }) => name === value);
+    return known ? short(known.title) : value.replace(SAVED_START, "");
   }
 
   async #assign(value) {
     try {
-      this.acts.putMaterial(await this.#fetch(value), this.#titleOf(value));
+      this.acts.assign(await this.#fetch(value), this.#titleOf(value));
       this.#origins.set(this.acts.material, value);
       this.shown.mark(value);
     } catch (problem) {
@@ -193,8 +195,7 @@ export class Shelf {
   async #open({ page, name, document, library }) {
     if (page === PAGE) return { name };
     if (!library) return { document, wanted: name };
-    const wanted = library.replace(SAVED_START, "");
-    return { document: await this.#fetch(library), wanted, title: this.#titleOf(library) };
+    return { document: await this.#fetch(library), wanted: this.#titleOf(library) };
   }
 
   #carried(name) {
@@ -215,7 +216,7 @@ export class Shelf {
       this.thumbnails.own(image, this.#carried(name), image.isWorn);
     }
     this.materials.mark(chosen.material);
-    this.shown.mark(this.#origins.get(scene.materials[chosen.material]) ?? null);
+    this.shown.mark(this.#origins.get(this.acts.material) ?? null);
     this.environments.fill(
       [
         {

@@ -84,7 +84,7 @@ export class Sweep {
     const { material, materialPlace: place, state } = this.acts;
     const own = fields(this.schema, this.models[material.type]);
     const offered = sweepable(own, material);
-    if (!offered.length) return this.acts.complain(new Error("This material has no parameter with a range."));
+    if (!offered.length) return this.acts.complain(new Error("This material has no parameter to try."));
     const id = freshId("sweep");
     const select = element("select", { id: `${id}-of`, onchange: () => choose() }, ...options(offered));
     select.value = firstOf(offered, material, name).name;
@@ -103,7 +103,7 @@ export class Sweep {
         element("button", { type: "button", class: "button small", onclick: () => dialog.close() }, "Close"),
       ),
       element("div", { class: "row" }, element("label", { for: `${id}-of` }, "Parameter"), select, ends.element),
-      unused ? element("p", { class: "note" }, "Nothing is made of this material: all pictures are alike.") : null,
+      unused ? element("p", { class: "note" }, "No thing wears this material, so all pictures look alike.") : null,
       row,
       status,
       trouble,

@@ -24,7 +24,7 @@ export class WhenClean {
     const { noise } = this.page.header;
     const answer = await question({
       title: `${noise === null ? "Much" : percent(noise)} noise: save now or when clean?`,
-      detail: `Clean is under ${percent(CLEAN)}, or what the picture has when it is done.`,
+      detail: `Clean means less than ${percent(CLEAN)} noise, or the finished picture.`,
       choices: [
         { label: "Save now", value: "now" },
         { label: "When clean", value: "later" },

@@ -64,7 +64,7 @@ function depth(floats, paint) {
     ],
     `${significant(near)} m`,
     `${significant(far)} m`,
-    "Black: nothing was hit",
+    "Black: nothing is there",
   );
 }
 
@@ -121,7 +121,7 @@ export const LEGENDS = {
     ],
     note: "The angle between the view and the surface's normal",
   },
-  albedo: { note: "The share of light that comes back from the first surface" },
+  albedo: { note: "How much light the surface sends back" },
   normal: {
     swatches: [
       { color: "rgb(255 128 128)", text: "+X" },

@@ -8,7 +8,7 @@ import { isOn } from "../document/outline.js";
 import { add, length, scale } from "../lib/vector.js";
 import { ballsOf, brightestOf } from "./environment-ball.js";
 
-const CHOOSE = "Select a light or the environment first: a highlight is one of these, mirrored.";
+const CHOOSE = "Select a light or the environment first.";
 
 // The mirrored ray {point, way} at a place of the picture, or null where nothing is.
 async function mirroredAt(picker, scene, camera, place, aspect) {
@@ -31,15 +31,15 @@ export async function placeHighlight({ acts, picker, say }, place, aspect) {
   if (isOn(acts.state, "locked", [thing])) return say("It is locked");
   const balls = isEnvironment ? ballsOf(scene.environment) : null;
   const found = await mirroredAt(picker, scene, acts.camera, place, aspect);
-  if (!found) return say("Nothing there to mirror a light");
+  if (!found) return say("There is nothing there that could show a highlight");
   if (isEnvironment) {
     const own = brightestOf(await balls);
-    if (!own) return say("This environment is the same on all sides");
+    if (!own) return say("This environment is the same on all sides, so turning it changes nothing");
     const rotation = rotationTo(own, found.way);
     acts.edit("/scene/environment/rotation", rotation, null);
     return say(`Environment turned to ${rotation}°`);
   }
   const target = targetOf(scene, lamp, acts.camera);
   acts.edit(`/scene${thing}`, putOnRay(lamp, target, found), null);
-  say("The light is mirrored there");
+  say("The highlight is there");
 }

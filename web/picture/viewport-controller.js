@@ -9,9 +9,9 @@ import { HANDLED } from "../document/ui-state.js";
 
 // A click before there is a picture.
 const EARLY = {
-  focus: "Nothing can be focused on yet: the picture is still being prepared. Click again once it is there.",
-  highlight: "Nothing can be mirrored yet: the picture is still being prepared. Click again once it is there.",
-  select: "Nothing can be selected in the picture yet: it is still being prepared. The outline has everything.",
+  focus: "One moment: the picture is not ready. Click again to focus.",
+  highlight: "One moment: the picture is not ready. Click again to place the highlight.",
+  select: "One moment: the picture is not ready. Until then, choose things in the outline.",
 };
 
 export class ViewportController {

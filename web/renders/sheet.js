@@ -113,7 +113,7 @@ export class RenderSheet {
     if (target_noise) return `, down to ${percent(target_noise)} noise`;
     const price = priceOf(limit, { live, size: this.size });
     if (!price) return "";
-    return ` in about ${duration(price.seconds)}, ${price.isListed ? "by the price list" : "as measured on this scene"}`;
+    return ` in about ${duration(price.seconds)}, ${price.isListed ? "estimated" : "as measured on this scene"}`;
   }
 
   // Starts the render that the buttons promise.

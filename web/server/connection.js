@@ -21,8 +21,8 @@ const REASONS = {
   },
   4401: { title: "The server asks for a key.", final: true, key: true },
   4403: {
-    title: "The server does not take streams from this page's address.",
-    detail: "Its operator can name the address in SUNBOX_ALLOWED_ORIGINS.",
+    title: "The server does not accept this page's address.",
+    detail: "Whoever runs it can allow the address by SUNBOX_ALLOWED_ORIGINS.",
     final: true,
   },
   4409: {
@@ -35,7 +35,7 @@ const REASONS = {
     detail: "Your scene is safe here; the picture comes as soon as somebody leaves.",
     full: true,
   },
-  4500: { title: "The server lost its renderer.", detail: "Your scene is safe here." },
+  4500: { title: "The renderer stopped.", detail: "Your scene is safe here." },
 };
 const LOST = { title: "The connection to the server was lost.", detail: "Your scene is safe here." };
 

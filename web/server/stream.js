@@ -108,7 +108,7 @@ export class Stream {
       capture.timer = setTimeout(() => {
         this.#captures = this.#captures.filter((each) => each !== capture);
         if (capture.preview) resolve(capture.preview);
-        else reject(new NotReady("The picture is still being prepared. Try again once it is there."));
+        else reject(new NotReady("One moment: the picture is not ready."));
         this.#tellView();
       }, patience_ms);
       this.#captures.push(capture);

@@ -205,6 +205,7 @@ absent:bound(nodes,"x-absent"),
 follows:bound(nodes,"x-follows"),
 ranges:bound(nodes,"x-ranges"),
 used:bound(nodes,"x-used"),
+unless:bound(nodes,"x-unless"),
 beside:bound(nodes,"x-beside"),
 example:bound(nodes,"examples")?.[0],
 isPerChannel:Boolean(vector&&numeric&&bound(nodes,"x-group")),
@@ -1278,6 +1279,7 @@ each.element.classList.toggle(
 "unused",
 Boolean(field.used)&&!field.used.values.includes(valueOf(field.used.field)),
 );
+each.element.hidden=(values[field.unless] ?? null)!==null;
 }
 parts?.show(values);
 },
