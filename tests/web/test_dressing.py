@@ -27,9 +27,8 @@ def state(*worn: str, **compare: Any) -> dict[str, Any]:
     }
 
 
-def dressed(page: Page, before: dict[str, Any], things: list[str], *was: str, **what: Any) -> Any:
-    what = what or {"document": GOLD, "wanted": "Gold"}
-    return call(page, DRESSING, "dressed", before, things, what, *was)
+def dressed(page: Page, before: dict[str, Any], things: list[str], *was: str) -> Any:
+    return call(page, DRESSING, "dressed", before, things, {"document": GOLD, "wanted": "Gold"}, *was)
 
 
 def worn(made: dict[str, Any]) -> list[str]:
@@ -85,7 +84,7 @@ def test_a_refused_material_leaves_all_as_it_was(page: Page, shared: bool) -> No
     made = dressed(page, before, ["/shapes/0"])
     after = {**before, **{key: made[key] for key in ("scene", "compare")}}
     after["chosen"] = {"thing": "/shapes/0", "material": "Gold"}
-    assert call(page, DRESSING, "withdrawn", after, made["arrival"]) == before
+    assert call(page, "document/material-set.js", "withdrawn", after, made["arrival"]) == before
 
 
 def test_the_selection_follows_a_material(page: Page) -> None:

@@ -1,25 +1,23 @@
-// Things are made of another material: one of the scene ({name}), or one that comes from elsewhere ({document, wanted}),
-// bare or with its textures. That one has the name that is wished for, or a free one like it. It takes the place of a
-// material that nothing else is made of; the same material again, as it came, is not there twice.
+// Things are made of a material that comes from elsewhere, bare or with its textures. It has the name that is wished for,
+// or a free one like it, and takes the place of a material that nothing else is made of; the same material again, as it
+// came, is not there twice.
 
 import { exchanged, fresh, users, wearing } from "./materials.js";
 import { received, unpacked, withTextures } from "./material-set.js";
 import { at, equal, pointer, put } from "../lib/patch.js";
 
 // {scene, compare, material, arrival, lost}: the scene with it on some things, and its name there; `arrival` as
-// `withdrawn` takes it and `lost` as `received` says it of what comes from elsewhere. `was`: the material that it is to
-// replace, where no thing is named.
-export function dressed(state, things, { name, document, wanted }, was = at(state.scene, things[0]).material) {
+// `withdrawn` takes it and `lost` as `received` says it. `was`: the material that it is to replace, where no thing is
+// named.
+export function dressed(state, things, { document, wanted }, was = at(state.scene, things[0]).material) {
   const { scene, compare } = state;
-  const none = { arrival: null, lost: [] };
-  if (document === undefined) return { scene: wearing(scene, things, name), compare, material: name, ...none };
   const isReplaced = users(scene, was).every((i) => things.includes(pointer("shapes", i)));
   const { material, textures, added, lost } = received(scene, unpacked(document)[0]);
   const isCompared = isReplaced && compare?.material === was; // its variant B goes with it, under its new name
   const known = added.length || isCompared ? undefined : alike(scene, wanted, material);
   if (known !== undefined) {
     const next = isReplaced && known !== was ? exchanged(state, was, known).scene : scene;
-    return { scene: wearing(next, things, known), compare, material: known, ...none, lost };
+    return { scene: wearing(next, things, known), compare, material: known, arrival: null, lost };
   }
   const { [was]: before, ...others } = scene.materials;
   const given = fresh(wanted, isReplaced ? others : scene.materials);
@@ -38,12 +36,3 @@ const alike = ({ materials }, wanted, material) =>
     const rest = name.startsWith(wanted) ? name.slice(wanted.length) : null;
     return rest !== null && /^([- ]\d+)?$/.test(rest) && equal(materials[name], material);
   });
-
-// A state without a material that had come to a place: {place, before, added} as it was put there, and {name, was} where
-// it came under a name of its own.
-export function withdrawn(state, { place, before, added, name, was }) {
-  const back = name === undefined ? put(state, place, before) : { ...state, ...exchanged(state, name, was, before) };
-  const { textures, ...scene } = back.scene;
-  const left = Object.entries(textures ?? {}).filter(([each]) => !added.includes(each));
-  return { ...back, scene: withTextures(scene, Object.fromEntries(left)) };
-}

@@ -1,15 +1,13 @@
-// What the hand does, as changes of the state {scene, settings, view, chosen, home, compare}. `chosen` is what
-// the pickers show, `home` the scene as it was picked, `compare` a second variant of one
-// material (variants.js).
+// What the hand does, as changes of the state {scene, settings, view, chosen, home, compare}. `chosen` is what the pickers
+// show, `home` the scene as it was picked, `compare` a second variant of one material (variants.js).
 
 import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
-import { dressed, withdrawn } from "./dressing.js";
 import { exposed } from "./lighting.js";
 import { isFlat } from "./bounds.js";
-import { carried, missingWords, received, unpacked, withTextures } from "./material-set.js";
-import { isShape, selectedWith, users } from "./materials.js";
+import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
+import { isShape, selectedWith, users, wearing } from "./materials.js";
 import { filesFor, modelOfFile } from "./model-files.js";
 import { inWords } from "../lib/format-text.js";
 import { at, pointer, put } from "../lib/patch.js";
@@ -199,8 +197,7 @@ export class Editor extends Store {
   }
 
   pickMaterial(material) {
-    const { chosen } = this.state;
-    this.amend({ chosen: { ...chosen, material, thing: selectedWith(this.state, material) } });
+    this.amend({ chosen: { ...this.state.chosen, material, thing: selectedWith(this.state, material) } });
   }
 
   // The material in hand, with the textures that it shows.
@@ -215,19 +212,26 @@ export class Editor extends Store {
     const place = this.materialPlace;
     const { material, textures, added, lost } = received(this.state.scene, unpacked(document)[0]);
     this.#arrival = { place, before: this.material, material, added };
-    const { scene } = this.state;
-    this.change(put({ ...this.state, scene: withTextures(scene, textures) }, place, material));
+    this.change(put({ ...this.state, scene: withTextures(this.state.scene, textures) }, place, material));
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
-  // Things get a material, as `dressed` has it; without any it comes in the place of the one in hand.
-  dress(things, what) {
+  // Things are made of another material of the scene.
+  wear(things, material) {
+    const { scene, chosen } = this.state;
+    const thing = things.includes(chosen.thing) ? chosen.thing : things[0];
+    this.change({ scene: wearing(scene, things, material), chosen: { ...chosen, thing, material } });
+  }
+
+  // Things get a material from elsewhere, as `dressed` has it; without any it comes in the place of the one in hand.
+  async dress(things, what) {
+    const { dressed } = await import("./dressing.js");
     const { chosen } = this.state;
     const was = things.length ? undefined : chosen.material;
-    const { scene, compare, material, arrival, lost } = dressed(this.state, things, what, was);
+    const { arrival, lost, material, ...made } = dressed(this.state, things, what, was);
     this.#arrival = arrival;
-    const thing = things.includes(chosen.thing) ? chosen.thing : (things[0] ?? selectedWith({ scene, chosen }, material));
-    this.change({ scene, compare, chosen: { ...chosen, thing, material } });
+    const thing = things.find((each) => each === chosen.thing) ?? things[0] ?? selectedWith({ ...made, chosen }, material);
+    this.change({ ...made, chosen: { ...chosen, thing, material } });
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
@@ -240,7 +244,7 @@ export class Editor extends Store {
     const selected = this.selection.includes(chosen.thing) ? this.selection : [chosen.thing];
     const things = isCompared ? [] : selected.filter(isShape);
     const worn = users(scene, chosen.material).map((i) => pointer("shapes", i));
-    this.dress(things.length ? things : worn, { document, wanted });
+    return this.dress(things.length ? things : worn, { document, wanted });
   }
 
   pickModel(type) {

@@ -1,8 +1,8 @@
 // A material with the textures that it shows, as it is saved, copied and carried into other scenes: a bare material
 // where it shows none, else {materials: {NAME: material}, textures: {NAME: texture}}.
 
-import { fresh } from "./materials.js";
-import { equal, isObject } from "../lib/patch.js";
+import { exchanged, fresh } from "./materials.js";
+import { equal, isObject, put } from "../lib/patch.js";
 
 const shows = (value) => isObject(value) && typeof value.texture === "string";
 
@@ -78,6 +78,15 @@ export function received(scene, { material, textures: carriedOnes }) {
 
 // The scene with these textures, which it has no table for where there are none.
 export const withTextures = (scene, textures) => (Object.keys(textures).length ? { ...scene, textures } : scene);
+
+// A state without a material that had come to a place: {place, before, added} as it was put there, and {name, was} where
+// it came under a name of its own.
+export function withdrawn(state, { place, before, added, name, was }) {
+  const back = name === undefined ? put(state, place, before) : { ...state, ...exchanged(state, name, was, before) };
+  const { textures, ...scene } = back.scene;
+  const left = Object.entries(textures ?? {}).filter(([each]) => !added.includes(each));
+  return { ...back, scene: withTextures(scene, Object.fromEntries(left)) };
+}
 
 // What the picture of a material depends on; the same as `before` where nothing of it is another object.
 export function pictured(material, { textures = {} }, before = []) {

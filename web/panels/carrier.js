@@ -96,7 +96,9 @@ export class Carrier {
     this.#end();
     try {
       const thing = await this.#thingAt(place);
-      if (thing) this.acts.dress([thing], await what);
+      const { name, ...other } = thing ? await what : {};
+      if (name !== undefined) this.acts.wear([thing], name);
+      else if (thing) await this.acts.dress([thing], other);
       else this.say("There is no thing there to put the material on.");
     } catch (problem) {
       this.acts.complain(problem);

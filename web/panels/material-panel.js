@@ -24,7 +24,7 @@ export class MaterialPanel {
       "own-material": () => this.#copy(),
       "rename-material": () => this.rename(this.#name),
       "delete-material": () => this.remove(this.#name),
-      "put-on": () => acts.dress([acts.state.chosen.thing], { name: this.#name }),
+      "put-on": () => acts.wear([acts.state.chosen.thing], this.#name),
     };
     for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
     find("material-name").addEventListener("dblclick", ({ target }) => this.rename(this.#name, target));

@@ -250,7 +250,7 @@ export class Outliner {
       "select",
       {
         "aria-label": "Material of all that is selected",
-        onchange: ({ target }) => this.acts.dress(shapes, { name: target.value }),
+        onchange: ({ target }) => this.acts.wear(shapes, target.value),
       },
       element("option", { value: "", disabled: true, selected: true }, "Material…"),
       ...Object.keys(scene.materials).map((name) => element("option", { value: name }, name)),

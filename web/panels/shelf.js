@@ -179,7 +179,7 @@ export class Shelf {
 
   async #assign(value) {
     try {
-      this.acts.assign(await this.#fetch(value), this.#titleOf(value));
+      await this.acts.assign(await this.#fetch(value), this.#titleOf(value));
       this.#origins.set(this.acts.material, value);
       this.shown.mark(value);
     } catch (problem) {
