@@ -9,6 +9,7 @@
 # make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it;
 #                        with RENDERERS="--devices llvmpipe:2" or RENDERERS="--ray 2" there are several
 # make gallery DATA=...  render the README's pictures, from the folder with the models
+# make thumbnails        render the editor's pictures of those presets that have changed
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
 # make bench-compare [REV=HEAD]  this checkout beside a revision, in turns: speed, error, same bits or not
 # make bench | lint | setup [PYTHON=python3.12]
@@ -18,7 +19,7 @@ export PYTHON
 # Where it is set, every server under test would compile all modules, and every run of pytest all tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run warm test long-test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
+.PHONY: run warm test long-test extremes hostile image-test soak bench bench-compare tradeoff gallery thumbnails lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -61,6 +62,9 @@ tradeoff: setup
 
 gallery: setup
 	.venv/bin/python -m tests.bench gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"
+
+thumbnails: setup
+	.venv/bin/python -m tests.bench thumbnails
 
 # JavaScript's formatter has no package for pip: it is run where it is there (npm install --global @biomejs/biome@2).
 lint: setup

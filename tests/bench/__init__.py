@@ -28,5 +28,7 @@ soak_server     the server under test of `soak` and `restarts`
 soak_tally      the results of `soak`, counted
 gallery         the README's pictures
 verdict         false alarms of comparisons
-thumbnails      the editor's pictures of the material presets
+thumbnails      the editor's pictures of the presets
+thumbnail_stages  what a material is shown on, and in which light
+thumbnail_shapes  shapes for materials that a ball does not show
 """

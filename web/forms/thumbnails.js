@@ -3,19 +3,22 @@
 
 import { fetchPreset, renderPicture } from "../server/api.js";
 import { HEX, hex, linear } from "../lib/color.js";
+import { equal } from "../lib/patch.js";
 import { recall, remember } from "../lib/browser-storage.js";
 import { received, unpacked, withTextures } from "../document/material-set.js";
 
-const SIDE = 96;
-const SETTINGS = { width: SIDE, height: SIDE, max_samples: 32, max_bounces: 6, seed: 1 };
+const SIDE = 144;
+const SETTINGS = { width: SIDE, height: SIDE, max_samples: 16, max_bounces: 8, seed: 1, denoise: true };
 
-// The stage that every material stands on: the one that `tests/bench/thumbnails.py` takes the presets in.
+// The stage that every material stands on: the one in which `tests/bench/thumbnails.py` shows most of the presets.
 export async function studio() {
-  const [set, environment] = await Promise.all([
+  const [set, cyclorama, environment] = await Promise.all([
     fetch(beside("studio.json")).then((answer) => answer.json()),
+    fetchPreset("stages", "cyclorama"),
     fetchPreset("environments", "studio"),
   ]);
-  return { ...set, environment };
+  const materials = { ...set.materials, ...cyclorama.materials };
+  return { ...set, environment, materials, shapes: [...set.shapes, ...cyclorama.shapes] };
 }
 
 // With a material on its subject, bare or with its textures.
@@ -72,26 +75,54 @@ function ball(color) {
   return canvas.convertToBlob();
 }
 
+// The middle of a picture, as a square.
+function cropped(picture) {
+  const canvas = new OffscreenCanvas(SIDE, SIDE);
+  const side = Math.min(picture.width, picture.height);
+  const [left, top] = [(picture.width - side) / 2, (picture.height - side) / 2];
+  canvas.getContext("2d").drawImage(picture, left, top, side, side, 0, 0, SIDE, SIDE);
+  return canvas.convertToBlob({ type: "image/webp" });
+}
+
+// What a material looks like, whatever it and its textures' set are called: [material, textures].
+const looks = (document) => unpacked(document).map(({ material, textures }) => [material, textures])[0];
+
 export class Thumbnails {
   #queue = [];
   #working = null;
   #scene = null;
-  #index = null;
+  #presets = new Map(); // looks of material presets that were fetched, by name
 
   // `isIdle()`: the server has nothing better to do; `ready` resolves when the network has not.
   constructor(isIdle, ready) {
     Object.assign(this, { isIdle, ready });
   }
 
-  // The picture of a material preset, or of what `get` gives where there is none.
+  // The picture of a material preset, or of what `get` gives if there is none.
   async preset(image, name, get) {
-    if (await this.#has("materials", name)) fetchWhenSeen(image, `${encodeURIComponent(name)}.webp`);
-    else onceSeen(image, () => this.later(image, get));
+    await this.ready;
+    this.#fetch(image, `${encodeURIComponent(name)}.webp`, () => onceSeen(image, () => this.later(image, get)));
   }
 
   // The picture of a scene or an environment, of which only presets have one.
   async place(image, kind, name) {
-    if (await this.#has(kind, name)) fetchWhenSeen(image, `${kind}/${encodeURIComponent(name)}.webp`);
+    await this.ready;
+    this.#fetch(image, `${kind}/${encodeURIComponent(name)}.webp`);
+  }
+
+  // Where there is no such file a grey ball is shown, and `otherwise` is called.
+  #fetch(image, path, otherwise = () => {}) {
+    const isMissing = async () => {
+      await this.plain(image, GREY);
+      otherwise();
+    };
+    image.addEventListener("error", isMissing, { once: true });
+    fetchWhenSeen(image, path);
+  }
+
+  // Remembers a material preset: a material that looks the same shows the preset's picture.
+  knows(name, document) {
+    this.#presets.set(name, looks(document));
   }
 
   // A plain ball of a colour.
@@ -99,32 +130,48 @@ export class Thumbnails {
     show(image, await ball(color));
   }
 
-  async #has(kind, name) {
-    await this.ready;
-    this.#index ??= fetch(beside("index.json"))
-      .then((answer) => answer.json())
-      .catch(() => ({}));
-    return (await this.#index)[kind]?.[name] !== undefined;
+  // The middle of a picture that is there already, until another is asked for.
+  async atOnce(image, picture) {
+    show(image, await cropped(picture));
   }
 
   // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped. Where it is
   // not to be `rendered`, one is shown that was rendered before.
   later(image, get, isRendered = true) {
     if (!image.src) this.plain(image, GREY);
-    this.#queue = this.#queue.filter((each) => each.image !== image);
+    this.#drop(image);
     this.#queue.push({ image, get, isRendered });
     this.work();
+  }
+
+  #drop(image) {
+    this.#queue = this.#queue.filter((each) => each.image !== image);
   }
 
   // The picture of a material of the scene, bare or with its textures: a ball of its colour, when that is new, until the
   // service has rendered it. What no thing wears stays so: nothing is prepared for that.
   async own(image, document, isWorn) {
-    const tint = Object.values(unpacked(document)[0].material).find(isColor) ?? GREY;
-    if (image.dataset.tint !== String(tint)) {
-      image.dataset.tint = String(tint);
-      await this.plain(image, tint);
+    const [material, textures] = looks(document);
+    const same = [...this.#presets].find(([, preset]) => equal(preset, [material, textures]));
+    const tint = same?.[0] ?? String(Object.values(material).find(isColor) ?? GREY);
+    const isNew = image.dataset.tint !== tint;
+    image.dataset.tint = tint;
+    if (same) {
+      this.#drop(image);
+      if (isNew) fetchWhenSeen(image, `${encodeURIComponent(same[0])}.webp`);
+      return;
     }
+    if (isNew) await this.plain(image, Object.values(material).find(isColor) ?? GREY);
     this.later(image, async () => document, isWorn);
+  }
+
+  // The picture of a material that users saved, which `get` fetches once the image is seen.
+  saved(image, get) {
+    onceSeen(image, async () => {
+      const document = await get();
+      if (image.src) this.later(image, async () => document);
+      else this.own(image, document, true);
+    });
   }
 
   // Call when the picture comes to rest, and when it goes on: what is being rendered then makes room and waits again.

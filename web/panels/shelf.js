@@ -133,7 +133,7 @@ export class Shelf {
     this.find("forget-saved").hidden = this.#kind !== SAVED || !this.saved.entries.length;
     this.shown.fill(shown, (image, value) => {
       const fetch = () => this.#fetch(value);
-      if (value.startsWith(`${SAVED} `)) this.thumbnails.later(image, fetch);
+      if (value.startsWith(`${SAVED} `)) this.thumbnails.saved(image, fetch);
       else this.thumbnails.preset(image, value, fetch);
     });
     if (this.#kindBefore === null) this.find("library").scrollLeft = this.#scrolls.get(this.#kind) ?? 0;
@@ -155,17 +155,22 @@ export class Shelf {
     return this.find("no-hit").replaceChildren(text, button);
   }
 
-  // Saved materials have come or gone; the one that was saved just now gets another picture.
-  refresh(changed = null) {
+  // Saved materials have come or gone; the one that was saved just now shows what is on the stage, until it is rendered.
+  async refresh(changed = null) {
     this.#list();
     const value = `${SAVED} ${changed}`;
     const image = this.shown.image(value);
-    if (image) this.thumbnails.later(image, () => this.#fetch(value));
+    if (!image) return;
+    await this.thumbnails.atOnce(image, this.find("picture"));
+    this.thumbnails.later(image, () => this.#fetch(value));
   }
 
   async #fetch(value) {
     if (value.startsWith(`${SAVED} `)) return this.saved.fetch(value.slice(SAVED.length + 1));
-    if (!this.#materials.has(value)) this.#materials.set(value, await fetchPreset("materials", value));
+    if (!this.#materials.has(value)) {
+      this.#materials.set(value, await fetchPreset("materials", value));
+      this.thumbnails.knows(value, this.#materials.get(value));
+    }
     return this.#materials.get(value);
   }
 
