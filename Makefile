@@ -8,7 +8,7 @@
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
 # make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it;
 #                        with RENDERERS="--devices llvmpipe:2" or RENDERERS="--ray 2" there are several
-# make gallery DATA=...  render the README's pictures, from the folder with the models
+# make gallery           render the README's pictures
 # make thumbnails        render the editor's pictures of those presets that have changed
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
 # make bench-compare [REV=HEAD]  this checkout beside a revision, in turns: speed, error, same bits or not
@@ -61,7 +61,7 @@ tradeoff: setup
 	.venv/bin/sunbox bench tradeoff --publish
 
 gallery: setup
-	.venv/bin/python -m tests.bench gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"
+	.venv/bin/python -m tests.bench gallery
 
 thumbnails: setup
 	.venv/bin/python -m tests.bench thumbnails

@@ -1,6 +1,6 @@
-"""The README's pictures, rendered again: `python -m tests.bench gallery DATA [NAME ...]`.
+"""The README's pictures, rendered again and denoised: `python -m tests.bench gallery [NAME ...]`.
 
-DATA has `hdri/studio.exr` (Poly Haven, CC0). Pictures go to web/gallery; their scenes are here or presets.
+They go to web/gallery; their scenes are here or presets.
 """
 
 from __future__ import annotations
@@ -17,66 +17,70 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service import presets
+from tests.bench import thumbnail_shapes as shapes
+from tests.bench import thumbnail_stages as stages
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 OUT = Path(__file__).resolve().parents[2] / "web" / "gallery"
-STUDIO = {"type": "image", "asset": "hdri/studio.exr", "background": False}
+ROWS = (  # of `materials`: what each is on, where that stands (x, z), and its radius
+    ("jade", "shell", (-2.1, -0.5), 0.52),
+    ("gold", "ball", (-0.72, -0.75), 0.56),
+    ("car-paint", "ball", (0.68, -0.75), 0.56),
+    ("porcelain", "shell", (2.08, -0.5), 0.52),
+    ("velvet", "ball", (-1.45, 0.75), 0.44),
+    ("diamond", "brilliant", (-0.32, 1.15), 0.44),
+    ("amber", "ball", (0.62, 1.15), 0.36),
+    ("glass", "ball", (1.55, 0.75), 0.42),
+)
 
 
 def roughness() -> dict[str, Any]:
     """Nine gold spheres, roughness 0 to 1 from left to right."""
-    materials: dict[str, Any] = {"table": {"type": "diffuse", "albedo": 0.25}}
-    shapes: list[dict[str, Any]] = [
-        {"type": "quad", "origin": [-80, 0, 80], "u": [160, 0, 0], "v": [0, 0, -160], "material": "table"}
-    ]
+    scene = stages.stage(0.3)
+    scene["camera"] = {"position": [0, 1.5, 14], "target": [0, 0.46, 0], "vfov": 8.2}
     for k in range(9):
-        name = f"roughness-{k / 8}"
-        materials[name] = {"type": "disney", "base_color": [1, 0.77, 0.34], "metallic": 1, "roughness": k / 8}
-        shapes.append({"type": "sphere", "center": [(k - 4) * 1.06, 0.5, 0], "radius": 0.5, "material": name})
-    return {
-        "version": 1,
-        "camera": {"position": [0, 1.3, 14], "target": [0, 0.45, 0], "vfov": 11.5},
-        "environment": {**STUDIO, "rotation": 200, "background": True},
-        "materials": materials,
-        "shapes": shapes,
-    }
+        name = f"roughness {k / 8}"
+        scene["materials"][name] = {
+            "type": "disney", "base_color": [1, 0.77, 0.34], "metallic": 1, "roughness": k / 8,
+        }  # fmt: skip
+        stages.put(scene, name, type="sphere", center=[(k - 4) * 1.06, 0.5, 0], radius=0.5)
+    stages.lamp(scene, (-5.0, 4.0, 3.0), (1.2, 3.0), [14, 13.5, 13])
+    return stages.lamp(scene, (5.0, 3.0, -2.4), (0.8, 3.0), [16, 16.5, 17])
 
 
 def materials() -> dict[str, Any]:
-    """Six of the material presets under the sky of a low sun."""
-    names = ("glass", "gold", "car-paint", "velvet", "porcelain", "amber")
-    floor = {"type": "quad", "origin": [-40, 0, 40], "u": [80, 0, 0], "v": [0, 0, -80], "material": "floor"}
-    spheres = [
-        {
-            "type": "sphere",
-            "center": [(k % 3 - 1) * 1.3 + (0.0 if k > 2 else 0.65), 0.5, k // 3 * 1.5],
-            "radius": 0.5,
-            "material": name,
-        }
-        for k, name in enumerate(names)
-    ]
-    return {
-        "version": 1,
-        "camera": {"position": [0.6, 2.6, 6.6], "target": [0, 0.5, 0.55], "vfov": 26},
-        "environment": {**presets.get("environments", "low-sun"), "rotation": 250, "scale": 0.1},
-        "materials": {"floor": {"type": "diffuse", "albedo": 0.4}}
-        | {name: presets.get("materials", name) for name in names},
-        "shapes": [*spheres, floor],
-    }
+    """Eight of the material presets in a studio, on balls, in bowls and cut."""
+    scene = stages.stage(0.28, 0.7)
+    scene["camera"] = {"position": [0, 2.5, 8.6], "target": [0, 0.5, 0.1], "vfov": 18.5}
+    scene["textures"] = {}
+    for name, shape, (x, z), size in ROWS:
+        document = presets.get("materials", name)
+        scene["textures"] |= document.get("textures", {})
+        scene["materials"][name] = stages.surface(document)
+        if shape == "ball":
+            stages.put(scene, name, type="sphere", center=[x, size, z], radius=size)
+            continue
+        turned = [38, 12, 0] if shape == "brilliant" else [34, 0, -30 if x < 0 else 30]
+        height = size * (0.7 if shape == "brilliant" else 1)
+        transform = {"rotate": turned, "translate": [x, height, z], "scale": size}
+        stages.put(scene, name, **getattr(shapes, shape)(), transform=transform)
+    stages.lamp(scene, (-4.2, 3.4, -2.2), (1.4, 2.4), [15, 14.5, 14])
+    stages.lamp(scene, (4.2, 3.4, -2.2), (1.4, 2.4), [15, 15.4, 16])
+    return stages.lamp(scene, (-3.2, 4.4, 4.6), (1.8, 1.8), [9, 8.7, 8.2])
 
 
 def preset(name: str) -> Callable[[], dict[str, Any]]:
     return lambda: presets.get("scenes", name)
 
 
-PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], float]] = {
-    # scene, (width, height, samples), exposure
-    "roughness": (roughness, (1200, 280, 512), -0.5),
-    "materials": (materials, (800, 440, 300), 0.0),
-    "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
-    "shader-ball": (preset("shader-ball"), (800, 600, 512), 0.0),
+PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int]]] = {
+    # scene, (width, height, samples)
+    "roughness": (roughness, (1200, 280, 128)),
+    "materials": (materials, (960, 480, 192)),
+    "cornell": (preset("cornell-boxes"), (512, 512, 256)),
+    "shader-ball": (preset("shader-ball"), (800, 600, 128)),
 }
 
 
@@ -161,7 +165,6 @@ def _photograph(
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("data", type=Path)
     parser.add_argument("names", nargs="*", default=[*PICTURES, *STATES], metavar="NAME")
 
 
@@ -174,7 +177,7 @@ def run(wanted: argparse.Namespace) -> int:
     for name in wanted.names:
         if name in STATES:
             continue
-        document, (width, height, samples), exposure = PICTURES[name]
+        document, (width, height, samples) = PICTURES[name]
         with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
             json.dump(document(), file)
             file.flush()
@@ -184,10 +187,8 @@ def run(wanted: argparse.Namespace) -> int:
                 file.name,
                 "-o",
                 OUT / f"{name}.png",
-                "--asset-root",
-                wanted.data,
             ]
-            command += ["--exposure", str(exposure)]
+            command += ["--set", "denoise=true", "--set", "clamp=20"]
             command += ["--spp", str(samples), "--set", f"width={width}", "--set", f"height={height}"]
             subprocess.run(command, check=True)
     return 0

@@ -80,9 +80,9 @@ def ball() -> Document:
 def rim_lit() -> Document:
     """Strips from behind on both sides: they draw the edge of what is black, and of pile that stands up."""
     scene = put(stage(0.12, 0.7), SUBJECT, **BALL)
-    lamp(scene, (-2.4, 1.5, -1.5), (0.9, 3.0), [52, 50, 48])
-    lamp(scene, (2.4, 1.5, -1.5), (0.9, 3.0), [60, 62, 65])
-    return lamp(scene, (-2.4, 2.6, 2.0), (0.5, 2.6), [34, 33, 32])
+    lamp(scene, (-2.4, 1.5, -1.5), (0.9, 3.0), [26, 25, 24])
+    lamp(scene, (2.4, 1.5, -1.5), (0.9, 3.0), [30, 31, 32.5])
+    return lamp(scene, (-2.4, 2.6, 2.0), (0.5, 2.6), [30, 29, 28])
 
 
 def clear() -> Document:
