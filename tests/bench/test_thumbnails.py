@@ -59,7 +59,7 @@ def test_a_material_stands_where_it_shows_what_it_is() -> None:
     assert used["ball"] > len(chosen) / 2, "those of one shape are compared with one another"
     for name in ("skin", "wax", "milk", "jade", "chalk", "porcelain"):
         assert chosen[name] is stages.back_lit, name
-    for name in ("glass", "water", "physically-based-wine-red"):
+    for name in ("glass", "amber", "physically-based-wine-red"):
         assert chosen[name] is stages.clear, name
     for name in ("rubber", "velvet", "physically-based-musou-black"):
         assert chosen[name] is stages.rim_lit, name

@@ -93,6 +93,24 @@ def clear() -> Document:
     return lamp(scene, (0, 2.7, -2.9), (1.3, 0.6), [40, 40, 40], aim=(0, 0.5, -3.7))
 
 
+def bubble() -> Document:
+    """Before black, where nothing outshines the colours of a film."""
+    return put(stage(0.05, 0.9), SUBJECT, **BALL)
+
+
+def drops() -> Document:
+    """Drops on dark slate, which gather the light behind them."""
+    scene = stage(0.3, 0.8)
+    scene["camera"] = {"position": [0, 2.3, 4.6], "target": [0, 0.3, 0], "vfov": 26.5}
+    scene["materials"]["slate"] = {"type": "principled", "base_color": [0.05, 0.075, 0.095], "roughness": 0.35}
+    put(scene, "slate", type="quad", origin=[-4, 0.01, 4], u=[8, 0, 0], v=[0, 0, -5.8])
+    for x, z, radius in ((-0.22, -0.1, 0.74), (0.72, 0.42, 0.34), (0.74, -0.7, 0.24), (-0.62, 0.95, 0.2)):
+        turned = {"translate": [x, 0.01 + 0.12 * radius, z], "scale": [radius, 0.62 * radius, radius]}
+        put(scene, SUBJECT, type="sphere", center=[0, 0, 0], radius=1, transform=turned)
+    lamp(scene, (-1.8, 3.0, -2.6), (1.6, 1.6), [11, 11, 11])
+    return lamp(scene, (2.6, 1.8, -0.8), (0.4, 2.6), [12, 12.4, 13])
+
+
 def back_lit() -> Document:
     """A shell whose thin lip stands before a lamp."""
     scene = put(stage(0.22, 0.45), SUBJECT, **shapes.shell(), transform=leaning(34, 0, -30, 1.0))
@@ -150,7 +168,7 @@ def lantern() -> Document:
 
 def shaded() -> Document:
     """A lamp under its shade, which lights the floor."""
-    scene = stage(0.4, 0.12)
+    scene = stage(0.4, 0.3)
     scene["materials"]["shade"] = {"type": "principled", "base_color": [0.05, 0.16, 0.14], "roughness": 0.3}
     scene["materials"]["inside"] = {"type": "diffuse", "albedo": 0.8}
     put(scene, "shade", **shapes.lampshade(), transform={"translate": [0, 0.98, 0], "scale": 0.98})
@@ -159,11 +177,12 @@ def shaded() -> Document:
 
 SHOWN: dict[str, Callable[[], Document]] = {
     "velvet": rim_lit, "rough-velvet": rim_lit, "rubber": rim_lit, "oxidized-steel-sgd": rim_lit,
-    "walnut-sgd": rim_lit, "pvc-sgd": rim_lit, "oil-on-water": ball, "soap-film": ball,
+    "walnut-sgd": rim_lit, "pvc-sgd": rim_lit, "soap-film": bubble, "water": drops,
     "diamond": cut, "window-glass": window, "frosted-window": window, "leaf": leaf,
     "paper-lamp": lantern, "lamp": shaded,
     "chalk": back_lit, "ceramic": back_lit, "porcelain": back_lit, "teflon-abc": back_lit, "pearl": ball,
-    "physically-based-diamond": cut, "physically-based-sapphire": cut, "physically-based-soap-bubble": ball,
+    "physically-based-water": drops,
+    "physically-based-diamond": cut, "physically-based-sapphire": cut, "physically-based-soap-bubble": bubble,
 }  # fmt: skip
 
 

@@ -32,9 +32,11 @@ SAMPLES = 24  # of a material, whose picture is denoised
 SEEN_THROUGH = {"max_samples": 40, "sampler": "independent"}
 MORE: dict[Any, dict[str, Any]] = {
     stages.clear: SEEN_THROUGH,
+    stages.drops: SEEN_THROUGH,
+    stages.bubble: SEEN_THROUGH,
     stages.window: SEEN_THROUGH,
     stages.cut: {"max_samples": 64, "max_bounces": 24, "clamp": 30},
-    stages.lantern: {"max_samples": 64},
+    stages.lantern: SEEN_THROUGH | {"max_samples": 96},
 }
 KERNELS = Path.home() / ".cache"  # where the driver keeps them for everybody
 PATIENCE_S = 1800.0
