@@ -132,13 +132,14 @@ export class Thumbnails {
 
   // The middle of a picture that is there already, until another is asked for.
   async atOnce(image, picture) {
+    image.dataset.shown = "stage"; // before the wait: the material itself may come meanwhile
     show(image, await cropped(picture));
   }
 
   // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped. Where it is
   // not to be `rendered`, one is shown that was rendered before.
   later(image, get, isRendered = true) {
-    if (!image.src) this.plain(image, GREY);
+    if (!image.src && !image.dataset.shown) this.plain(image, GREY);
     this.#drop(image);
     this.#queue.push({ image, get, isRendered });
     this.work();
@@ -169,7 +170,7 @@ export class Thumbnails {
   saved(image, get) {
     onceSeen(image, async () => {
       const document = await get();
-      if (image.src) this.later(image, async () => document);
+      if (image.dataset.shown) this.later(image, async () => document);
       else this.own(image, document, true);
     });
   }
