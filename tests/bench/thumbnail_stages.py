@@ -101,13 +101,13 @@ def bubble() -> Document:
 def drops() -> Document:
     """Drops on dark slate, which gather the light behind them."""
     scene = stage(0.3, 0.8)
-    scene["camera"] = {"position": [0, 2.3, 4.6], "target": [0, 0.3, 0], "vfov": 26.5}
-    scene["materials"]["slate"] = {"type": "principled", "base_color": [0.05, 0.075, 0.095], "roughness": 0.35}
-    put(scene, "slate", type="quad", origin=[-4, 0.01, 4], u=[8, 0, 0], v=[0, 0, -5.8])
+    scene["camera"] = {"position": [0, 3.5, 3.9], "target": [0.05, 0.08, 0.16], "vfov": 23.5}
+    scene["materials"]["slate"] = {"type": "principled", "base_color": [0.035, 0.075, 0.12], "roughness": 0.42}
+    put(scene, "slate", type="quad", origin=[-4, 0.01, 4], u=[8, 0, 0], v=[0, 0, -6.4])
     for x, z, radius in ((-0.22, -0.1, 0.74), (0.72, 0.42, 0.34), (0.74, -0.7, 0.24), (-0.62, 0.95, 0.2)):
         turned = {"translate": [x, 0.01 + 0.12 * radius, z], "scale": [radius, 0.62 * radius, radius]}
         put(scene, SUBJECT, type="sphere", center=[0, 0, 0], radius=1, transform=turned)
-    lamp(scene, (-1.8, 3.0, -2.6), (1.6, 1.6), [11, 11, 11])
+    lamp(scene, (-1.6, 3.4, -2.8), (1.3, 1.3), [44, 43, 42])
     return lamp(scene, (2.6, 1.8, -0.8), (0.4, 2.6), [12, 12.4, 13])
 
 
