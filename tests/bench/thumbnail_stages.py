@@ -36,7 +36,8 @@ def stage(backdrop: float | None = None, ambient: float = 1.0) -> Document:
         scene["environment"]["scale"] = ambient
     scene["materials"] |= cyclorama["materials"]
     if backdrop is not None:
-        scene["materials"]["backdrop"]["albedo"] = backdrop
+        for material in cyclorama["materials"].values():
+            material["albedo"] = backdrop
     scene["shapes"] = cyclorama["shapes"]
     return scene
 
