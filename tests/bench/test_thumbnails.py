@@ -24,7 +24,8 @@ def test_every_preset_has_a_picture_of_itself() -> None:
     """Else: `make thumbnails`."""
     assert thumbnails.wanted() == INDEX
     pictures = {thumbnails.picture(kind, name) for kind, all_of_it in INDEX.items() for name in all_of_it}
-    assert set(thumbnails.FOLDER.rglob("*.webp")) == pictures
+    page = thumbnails.FOLDER / "first"  # the picture that comes with the page is another matter
+    assert {path for path in thumbnails.FOLDER.rglob("*.webp") if path.parent != page} == pictures
     assert all(path.read_bytes()[8:12] == b"WEBP" for path in pictures)
 
 
