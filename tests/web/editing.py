@@ -16,10 +16,14 @@ TRIANGLE = b"v -1 0.2 1.2\nv 1 0.2 1.2\nv 0 1.9 1.2\nf 1 2 3\n"
 
 
 def point(editor: Editor, x: float, y: float) -> tuple[float, float]:
-    """A place of the stage, 0..1, on the page."""
+    """A place of the picture, 0..1, on the page."""
     box = editor.page.locator("#stage").bounding_box()
     assert box is not None
-    return box["x"] + x * box["width"], box["y"] + y * box["height"]
+    wide, tall = editor.page.evaluate("(({ width, height }) => [width, height])(document.getElementById('picture'))")
+    zoom = min(box["width"] / wide, box["height"] / tall)
+    return box["x"] + box["width"] / 2 + (x - 0.5) * wide * zoom, box["y"] + box["height"] / 2 + (
+        y - 0.5
+    ) * tall * zoom
 
 
 def click(editor: Editor, x: float, y: float) -> None:

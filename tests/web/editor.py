@@ -88,6 +88,10 @@ class Editor:
     def text(self, selector: str) -> str:
         return self.page.inner_text(selector)
 
+    def told(self) -> str:
+        """What the message at the stage's foot says, with the lines that it has folded away."""
+        return " ".join((self.page.text_content("#messages") or "").split())
+
     def samples(self) -> int:
         digits = "".join(filter(str.isdigit, self.text("#samples").split("/")[0]))
         return int(digits or 0)

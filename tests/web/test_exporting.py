@@ -34,7 +34,7 @@ def test_a_program_makes_the_same_picture_and_glb_says_what_it_loses(
     made = editor.shot("#download-glb")
     told = page.locator("#messages .export")
     editor.wait("the losses", told.is_visible)
-    assert "no place" in told.inner_text() and "environment" in told.inner_text().lower()
-    assert "/scene" not in told.inner_text(), "places are in words"
+    assert "cannot hold" in editor.told() and "environment" in editor.told().lower()
+    assert "/scene" not in editor.told(), "places are in words"
     answer = server.http.post("/v1/assets", content=made)
     assert made[:4] == b"glTF" and answer.json()["kind"] == "scene"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from tests.web.editing import document
@@ -70,11 +72,12 @@ def test_a_camera_of_another_type_shows_as_much(editor: Editor) -> None:
     page = editor.page
     editor.tab("scene")
     page.click("#outline-list [data-thing='/camera']")
-    before = editor.settled()
+    before, was = editor.settled(), document(editor)["camera"]
     page.select_option("#camera-type", "orthographic")
     editor.wait_for_change(before)
     made = document(editor)["camera"]
-    assert made["type"] == "orthographic" and made["height"] == pytest.approx(2 * 5.234 * 0.2867, rel=0.01)
+    seen = 2 * math.dist(was["position"], was["target"]) * math.tan(math.radians(was["vfov"]) / 2)
+    assert made["type"] == "orthographic" and made["height"] == pytest.approx(seen, rel=0.01)
     editor.tab("scene")
     page.click("#outline-list [data-thing='/camera']")
     assert page.locator("#thing-form [data-field=height]").is_visible()

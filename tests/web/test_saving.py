@@ -274,7 +274,7 @@ def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     editor.drop("#stage", {"tiny.obj": tiny})
     editor.tab("scene")
     editor.wait("the mesh", lambda: editor.text("#thing-title") == "tiny")
-    told = " ".join(editor.text("#messages").split())
+    told = editor.told()
     assert "tiny.obj: good to know." in told and "100 times its size" in told and "1 face" in told, told
     shape = document(editor)["shapes"][-1]
     assert shape["transform"]["scale"] == 100 and shape["transform"]["translate"][1] == pytest.approx(-98), (
