@@ -39,7 +39,7 @@ ROWS = (  # of `materials`: what each is on, where that stands (x, z), and its r
 def roughness() -> dict[str, Any]:
     """Nine gold spheres, roughness 0 to 1 from left to right."""
     scene = stages.stage(0.3)
-    scene["camera"] = {"position": [0, 1.5, 14], "target": [0, 0.46, 0], "vfov": 8.2}
+    scene["camera"] = {"position": [0, 1.5, 14], "target": [0, 0.46, 0], "vfov": 10.3}
     for k in range(9):
         name = f"roughness {k / 8}"
         scene["materials"][name] = {
@@ -77,8 +77,8 @@ def preset(name: str) -> Callable[[], dict[str, Any]]:
 
 PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int]]] = {
     # scene, (width, height, samples)
-    "roughness": (roughness, (1200, 280, 128)),
-    "materials": (materials, (960, 480, 192)),
+    "roughness": (roughness, (1200, 280, 96)),
+    "materials": (materials, (960, 480, 128)),
     "cornell": (preset("cornell-boxes"), (512, 512, 256)),
     "shader-ball": (preset("shader-ball"), (800, 600, 128)),
 }
