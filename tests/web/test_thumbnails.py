@@ -42,7 +42,7 @@ def run(page: Page, work: str, given: Any = None) -> Any:
 
 
 def test_edited_materials_stand_on_the_stage_of_the_presets(page: Page) -> None:
-    script = """async () => (await import(new URL("forms/thumbnails.js", location))).studio()"""
+    script = """async () => (await import(new URL("forms/thumbnail-rendering.js", location))).studio()"""
     assert page.evaluate(script) == stages.ball()
 
 

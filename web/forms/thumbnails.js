@@ -1,31 +1,12 @@
 // Pictures of materials, rendered by the service: those of its presets lie beside this page, the others are
 // asked for when the main picture is at rest, one at a time, and kept in the browser.
 
-import { fetchPreset, renderPicture } from "../server/api.js";
 import { HEX, hex, linear } from "../lib/color.js";
 import { equal } from "../lib/patch.js";
-import { recall, remember } from "../lib/browser-storage.js";
-import { received, unpacked, withTextures } from "../document/material-set.js";
+import { unpacked } from "../document/material-set.js";
 
 const SIDE = 144;
-const SETTINGS = { width: SIDE, height: SIDE, max_samples: 16, max_bounces: 8, seed: 1, denoise: true };
-
-// The stage that every material stands on: the one in which `tests/bench/thumbnails.py` shows most of the presets.
-export async function studio() {
-  const [set, cyclorama, environment] = await Promise.all([
-    fetch(beside("studio.json")).then((answer) => answer.json()),
-    fetchPreset("stages", "cyclorama"),
-    fetchPreset("environments", "studio"),
-  ]);
-  const materials = { ...set.materials, ...cyclorama.materials };
-  return { ...set, environment, materials, shapes: [...set.shapes, ...cyclorama.shapes] };
-}
-
-// With a material on its subject, bare or with its textures.
-export function staged(scene, document) {
-  const { material, textures } = received(scene, unpacked(document)[0]);
-  return withTextures({ ...scene, materials: { ...scene.materials, subject: material } }, textures);
-}
+const code = () => import("./thumbnail-rendering.js"); // the first picture does without
 
 const beside = (name) => new URL(`thumbnails/${name}`, document.baseURI);
 
@@ -44,11 +25,6 @@ function onceSeen(image, then) {
   });
   watch.observe(image);
 }
-
-const hash = async (document) => {
-  const digest = await crypto.subtle.digest("SHA-256", new TextEncoder().encode(JSON.stringify(document)));
-  return [...new Uint8Array(digest.slice(0, 12))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-};
 
 const GREY = 0.4;
 const isColor = (value) => HEX.test(value) || (Array.isArray(value) && value.length === 3);
@@ -75,22 +51,12 @@ function ball(color) {
   return canvas.convertToBlob();
 }
 
-// The middle of a picture, as a square.
-function cropped(picture) {
-  const canvas = new OffscreenCanvas(SIDE, SIDE);
-  const side = Math.min(picture.width, picture.height);
-  const [left, top] = [(picture.width - side) / 2, (picture.height - side) / 2];
-  canvas.getContext("2d").drawImage(picture, left, top, side, side, 0, 0, SIDE, SIDE);
-  return canvas.convertToBlob({ type: "image/webp" });
-}
-
 // What a material looks like, whatever it and its textures' set are called: [material, textures].
 const looks = (document) => unpacked(document).map(({ material, textures }) => [material, textures])[0];
 
 export class Thumbnails {
   #queue = [];
   #working = null;
-  #scene = null;
   #presets = new Map(); // looks of material presets that were fetched, by name
 
   // `isIdle()`: the server has nothing better to do; `ready` resolves when the network has not.
@@ -133,7 +99,7 @@ export class Thumbnails {
   // The middle of a picture that is there already, until another is asked for.
   async atOnce(image, picture) {
     image.dataset.shown = "stage"; // before the wait: the material itself may come meanwhile
-    show(image, await cropped(picture));
+    show(image, await (await code()).cropped(picture));
   }
 
   // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped. Where it is
@@ -193,15 +159,8 @@ export class Thumbnails {
   }
 
   async #make({ image, get, isRendered }, signal) {
-    const document = await get();
-    const name = `thumbnail ${self.crypto.subtle ? await hash(document) : JSON.stringify(document)}`;
-    let blob = await recall(name);
-    if (!blob && !isRendered) return;
-    if (!blob) {
-      this.#scene ??= await studio();
-      blob = await renderPicture(staged(this.#scene, document), SETTINGS, signal);
-      remember(name, blob);
-    }
-    show(image, blob);
+    const { rendered } = await code();
+    const blob = await rendered(await get(), isRendered, signal);
+    if (blob) show(image, blob);
   }
 }
