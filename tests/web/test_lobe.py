@@ -247,7 +247,7 @@ def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
     page = lobe.page
     paste(lobe, {"type": "diffuse", "albedo": 1})
     lobe.drop("#material-form [data-field=albedo]", {"halves.png": halves()})
-    lobe.wait("the words", lambda: "the mean stands for that of albedo" in page.inner_text("#lobe"))
+    lobe.wait("the words", lambda: "The plot uses the average of the images of albedo" in page.inner_text("#lobe"))
     green, blue = (((byte / 255 + 0.055) / 1.055) ** 2.4 / 2 for byte in (220, 40))  # each on one side
     largest = (0.7152 * green + 0.0722 * blue) / math.pi
     said = re.compile(r"largest value ([\d.]+) per steradian")
