@@ -16,7 +16,7 @@ def to_the_horizon(editor: Editor) -> None:
     """Down to the floor, over which the sky is seen then."""
     before = editor.settled()
     editor.page.focus("#stage")
-    for _ in range(5):
+    for _ in range(2):
         editor.page.keyboard.press("ArrowDown")
     editor.wait_for_change(before)
 

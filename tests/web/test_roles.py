@@ -92,12 +92,17 @@ def test_everything_has_the_role_and_the_name_that_the_contract_says(visit: Call
     for name, value in (("Width", 64), ("Height", 48), ("Samples", 1)):
         by("spinbutton", name).fill(str(value))
         by("spinbutton", name).press("Enter")
+    items = by("list", "Renders").get_by_role("listitem")
+    ids = "(all) => all.map((each) => each.dataset.id)"
+    known = set(items.evaluate_all(ids))  # of those who were here before
     by("button", "Render picture").click()
-    item = by("list", "Renders").get_by_role("listitem")
+    editor.wait("another render", lambda: set(items.evaluate_all(ids)) - known)
+    (own,) = set(items.evaluate_all(ids)) - known
+    item = items.and_(page.locator(f"[data-id='{own}']"))
     editor.wait("its state", lambda: item.get_attribute("data-state") == "done")
 
     def is_whole() -> bool:
-        assert by("list", "Renders").get_by_role("listitem").get_attribute("aria-label")
+        assert item.get_attribute("aria-label")
         assert item.get_by_role("progressbar").count() == 1 and item.locator(".state").inner_text().startswith("Done")
         return all(item.get_by_role("button", name=name, exact=True).is_visible() for name in ON_A_RENDER)
 

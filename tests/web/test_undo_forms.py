@@ -34,12 +34,14 @@ SCENE: dict[str, Any] = {
     "lights": [{"type": "point", "position": [2, 3, 1], "intensity": 20}],
     "shapes": [{"type": "sphere", "center": [0, 1, 0], "radius": 1, "material": "ball"}],
 }
-# The first number of each form that is in sight, written, taken back, and written again.
+# The first number of each form that is in sight, written, taken back, and written again; but for emission, by which a
+# thing becomes a lamp, with another form, and for what is written with a unit.
 STEPS = """async () => {
     for (const each of document.querySelectorAll("#panel details")) each.open = true;
     await new Promise((resolve) => setTimeout(resolve, 50));
     const forms = () => [...document.querySelectorAll("#panel .form")].filter((each) => each.checkVisibility());
     const entryOf = (at) => [...(forms()[at]?.querySelectorAll("input.number") ?? [])]
+        .filter((each) => each.closest("[data-field]").dataset.field !== "emission" && !/[a-z%]/i.test(each.value))
         .find((each) => each.closest(".form") === forms()[at] && each.checkVisibility());
     const press = (id) => document.getElementById(id).click();
     return forms().map((_, at) => {
@@ -64,8 +66,8 @@ FORMS: list[tuple[str, set[str]]] = [
         "#outline-list [data-thing='/shapes/0'] .title",
         {"metallic", "scale", "position", "a", "priority", "translate"},
     ),
-    ("#outline-list [data-thing='/lights/0'] .title", {"position"}),
-    ("#outline-list [data-thing='/environment'] .title", {"radiance", "radius"}),
+    ("#outline-list [data-thing='/lights/0'] .title", {"power"}),
+    ("#outline-list [data-thing='/environment'] .title", {"radiance"}),
     ("#outline-list [data-thing='/camera'] .title", {"vfov", "exposure"}),
     ("#tab-render", {"width", "max_samples", "max_bounces"}),
 ]
