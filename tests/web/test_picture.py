@@ -43,7 +43,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     assert editor.page.get_attribute("#outline-list [data-thing='/shapes/0']", "aria-selected") == "true"
     assert editor.samples() >= samples, "picking costs no sample"
     to_the_horizon(editor)
-    click(editor, 0.5, 0.02)
+    click(editor, 0.05, 0.04)
     editor.wait("the sky", lambda: editor.text("#thing-title") == "Environment")
     click(editor, 0.5, 0.5)
     editor.wait("its outline", lambda: editor.page.evaluate(shown))
