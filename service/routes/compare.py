@@ -48,7 +48,7 @@ under_way = UnderWay()  # of this process, which is the only one that answers
 HEADER_REGIONS = 16  # in the header beside a map, which proxies bound to 8 KiB
 
 
-Name = Annotated[str, Field(pattern=r"^[\w-]{1,64}$")]
+Name = Annotated[str, Field(pattern=r"^[\w-]{1,64}$", examples=["before-and-after"])]
 
 
 class CompareQuery(BaseModel):

@@ -53,6 +53,7 @@ NAMES = {
     "GET /v1/batches/{id}/animation": "getBatchAnimation",
     "GET /v1/callbacks": "listCallbacks",
     "POST /v1/compare": "compare",
+    "GET /v1/compare/{name}": "getComparison",
     "POST /v1/export": "exportScene",
     "POST /v1/materials/convert": "convertMaterial",
     "POST /v1/bsdf": "evaluateBsdf",

@@ -125,6 +125,7 @@ VERDICT = {
     "psnr": 36,
     "flip": 0.0274,
     "ssim": 0.982,
+    "differing": {"share": 0.21, "difference": 0.043},
     "samples": {"a": 32, "b": 32},
     "regions": [{"x": 16, "y": 16, "width": 32, "height": 32, "p_value": 1.5e-10}],
 }
@@ -164,6 +165,7 @@ ANSWERS: dict[str, Any] = {
     "getBatch": BATCH_STATUS,
     "listCallbacks": [CALLBACK],
     "compare": VERDICT,
+    "getComparison": {"samples": 48, "max_samples": 256},
     "convertMaterial": {"material": CONVERTED, "lost": []},
     "evaluateBsdf": {"f": F, "pdf": [[0.0699, 12.3]], "delta": [[]]},
     "getBsdfAlbedo": {
