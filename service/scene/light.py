@@ -119,8 +119,7 @@ class DirectionalLight(_Light):
         Field(ge=0, le=90),
         hint(
             "Angular diameter",
-            "How large the light looks in the sky: 0 gives sharp shadows, 0.53 is the sun, more is softer. The "
-            "brightness stays.",
+            "How large the light looks: 0 gives sharp shadows, 0.53 is the sun, more is softer. Brightness stays.",
             unit="degrees",
             widget="angle",
             soft=10,

@@ -41,8 +41,7 @@ Mapping = Annotated[
     Literal["uv", "box", "sphere"],
     hint(
         "Mapping",
-        "uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box "
-        "shows the texture once a metre on the side that faces, sphere once around the middle.",
+        "By the shape's texture coordinates, or, without those: box, once a metre; sphere, once around the middle.",
     ),
 ]
 

@@ -254,7 +254,8 @@ def test_the_answer_to_an_upload_always_has_warnings(http: httpx.Client) -> None
 def test_every_preset_is_there(http: httpx.Client) -> None:
     for kind in ("scenes", "materials", "environments"):
         listed = http.get(f"/v1/presets/{kind}").json()
-        assert listed and all({"name", "title"} == entry.keys() - {"kind", "source"} for entry in listed)
+        assert listed and all({"name", "title"} == entry.keys() - {"kind", "source", "group"} for entry in listed)
+        assert any("group" in entry for entry in listed) is (kind == "scenes")
         assert all(("kind" in entry) is (kind == "materials") for entry in listed)
         for entry in listed:
             assert "title" not in http.get(f"/v1/presets/{kind}/{entry['name']}").json()

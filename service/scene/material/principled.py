@@ -124,8 +124,7 @@ class PrincipledMaterial(DisneyMaterial):
         AnyFraction,
         hint(
             "Diffuse transmission",
-            "How much light shines through to the other side, as through leaves and paper. Above 0 the thing is "
-            "a thin sheet.",
+            "How much light shines through, as through leaves and paper. Above 0 the thing is a thin sheet.",
             group="Transmission",
             unit="",
             widget="slider",

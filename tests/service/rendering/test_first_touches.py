@@ -153,7 +153,7 @@ def test_a_superset_kernel_depends_on_no_light() -> None:
     shown = Shown(document)
     superset = fallback.superset(shown.arrays)
     before = fallback.kernel_key(shown.arrays, shown.settings, superset)
-    for patch in ({"materials": {"Red paint": {"emission": 2.0}}}, {"lights": document["lights"][:1]}):
+    for patch in ({"materials": {"Ochre paint": {"emission": 2.0}}}, {"lights": document["lights"][:1]}):
         request = shown.change(patch)
         assert request is not None and fallback.kernel_key(request.arrays, request.settings, superset) == before
 
