@@ -9,4 +9,4 @@ const hasWork = () => {
   }
 };
 
-document.getElementById("last-picture").hidden = location.hash.length > 1 || hasWork();
+document.documentElement.classList.toggle("again", location.hash.length > 1 || hasWork());

@@ -169,7 +169,7 @@ def test_a_checker_stands_behind_transparency(editor: Editor) -> None:
     editor.tab("scene")
     editor.page.click("#outline-list [data-thing='/environment']")
     editor.page.click("#thing-form [data-field=background] input")
-    editor.wait("alpha", lambda: (overlay(editor, "picture")[..., 3] == 0).mean() > 0.1)
+    editor.wait("alpha", lambda: (overlay(editor, "picture")[..., 3] == 0).mean() > 0.02)
     assert "checker" in (editor.page.get_attribute("#stage", "class") or "")
     editor.page.keyboard.press("k")
     editor.wait("no alpha", lambda: (overlay(editor, "picture")[..., 3] == 255).all())
