@@ -16,8 +16,8 @@ def to_the_horizon(editor: Editor) -> None:
     """Down to the floor, over which the sky is seen then."""
     before = editor.settled()
     editor.page.focus("#stage")
-    for _ in range(2):
-        editor.page.keyboard.press("ArrowDown")
+    for _ in range(3):
+        editor.page.keyboard.press("ArrowUp")
     editor.wait_for_change(before)
 
 
