@@ -144,8 +144,8 @@ class FrameSource:
 
     def _smooths(self, shown: float, prior: Prior | None) -> bool:
         """Whether a picture of that scale may be shown denoised: a small one of the view's, where no guess at the
-        full one serves better."""
-        return shown == 1.0 or (self.denoising.live and prior is None)
+        full one serves better. Reads are of the full one."""
+        return shown == 1.0 or (self.denoising.live and prior is None and not self._denoised_reads)
 
     def _denoised_frame(self, shown: float) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
