@@ -155,8 +155,8 @@ class CheckerTexture(TypedDict, total=False):
     scale: list[float]
     """How many squares along u and v. (default [8.0, 8.0])"""
     mapping: Literal["uv", "box", "sphere"]
-    """uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box
-    shows the texture once a metre on the side that faces, sphere once around the middle. (default 'uv')"""
+    """By the shape's texture coordinates, or, without those: box, once a metre; sphere, once around the middle.
+    (default 'uv')"""
 
 
 class ConstantEnvironment(TypedDict, total=False):
@@ -269,8 +269,8 @@ class DirectionalLight(TypedDict, total=False):
     irradiance: Required[list[float] | float | str | dict[str, Any]]
     """How bright the light is on a surface that faces it. The sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
     angular_diameter: float
-    """How large the light looks in the sky: 0 gives sharp shadows, 0.53 is the sun, more is softer. The brightness
-    stays. (degrees, 0 to 90, default 0.0)"""
+    """How large the light looks: 0 gives sharp shadows, 0.53 is the sun, more is softer. Brightness stays. (degrees,
+    0 to 90, default 0.0)"""
     name: str
     """For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."""
 
@@ -368,8 +368,8 @@ class ImageTexture(TypedDict, total=False):
     wrap: Literal["repeat", "clamp", "mirror"]
     """What lies outside of the image, in both directions. (default 'repeat')"""
     mapping: Literal["uv", "box", "sphere"]
-    """uv: by the shape's texture coordinates. box, sphere: by its own space, for things without coordinates; box
-    shows the texture once a metre on the side that faces, sphere once around the middle. (default 'uv')"""
+    """By the shape's texture coordinates, or, without those: box, once a metre; sphere, once around the middle.
+    (default 'uv')"""
     scale: list[float]
     """Factors on u and v, applied first: 2 shows the image twice. (default [1.0, 1.0])"""
     rotation: float
@@ -774,8 +774,8 @@ class PrincipledMaterial(TypedDict, total=False):
     thin_walled: bool
     """A sheet without an inside, such as a window pane or a leaf: light goes straight through. (default False)"""
     diffuse_transmission: float | ScalarTexture
-    """How much light shines through to the other side, as through leaves and paper. Above 0 the thing is a thin
-    sheet. (0 to 1, default 0.0)"""
+    """How much light shines through, as through leaves and paper. Above 0 the thing is a thin sheet. (0 to 1, default
+    0.0)"""
     diffuse_transmission_color: list[float] | float | str | ColorTexture
     """The colour of the light that shines through, in place of the base colour. (0 to 1)"""
     specular_color: list[float] | float | str | ColorTexture
