@@ -61,7 +61,7 @@ const complain = (problem) => {
   messages.show("refusal", { title: problemText(problem, titles) });
 };
 
-const lastPicture = new LastPicture(find("last-picture"));
+const lastPicture = new LastPicture(find("last-picture"), root);
 let editor = null;
 const { schema, library, name, scene, left } = await boot({
   keyDialog: find("key-dialog"),
@@ -106,10 +106,9 @@ const viewport = new Viewport(find("picture"), {
   names: (aov) => namesOf(aov, stream.document),
   painted(frame) {
     const isFirst = !page.header;
-    root.classList.add("live");
     page.paint(frame);
     preparing.painted();
-    lastPicture.end();
+    lastPicture.painted(frame.header);
     status.frame(frame.header, page.limit);
     controller.painted(frame);
     comparison.now?.painted();
@@ -156,6 +155,7 @@ const stream = new Stream({
   },
   done({ generation }) {
     page.ended = generation;
+    lastPicture.end();
     tellState();
     say("The picture is done");
   },

@@ -1,4 +1,5 @@
-// The picture that was last seen of a scene, until its first frame is there. The first scene's comes with the page.
+// The picture that was last seen of a scene, until there is one as good: what was sharp does not turn blurred before it
+// is sharp again. Who touches the page sees what there is at once. The first scene's comes with the page.
 
 import { recall, remember } from "../lib/browser-storage.js";
 
@@ -6,7 +7,9 @@ const NAME = "last picture ";
 const WORK = "work"; // a scene that was changed; a built-in one has its own name
 const LONGEST = 960; // pixels of the longer side: some 50 kB
 const FIRST = "shader-ball"; // the scene of the page's own picture
-const FADE_MS = 300; // until the first frame covers it
+const FADE_MS = 300; // until the canvas covers it
+const NOISE = 0.1; // with the denoiser, about as clean as what is kept
+const TOUCHES = ["pointerdown", "keydown", "wheel", "drop"];
 
 // What a picture is of: {name, of}; `builtIn` is the name of a built-in scene as it comes, else null.
 export const subject = ({ scene, hidden = [] }, builtIn) =>
@@ -14,10 +17,16 @@ export const subject = ({ scene, hidden = [] }, builtIn) =>
 
 export class LastPicture {
   #isOver = false;
+  #isPainted = false;
+  #isTouched = false;
+  #listening = new AbortController();
 
-  // `image` lies under the picture.
-  constructor(image) {
+  // `image` lies under the canvas of `stage`, which has the class "live" from the frame on that is to be seen.
+  constructor(image, stage) {
     this.image = image;
+    this.stage = stage;
+    const options = { capture: true, passive: true, signal: this.#listening.signal };
+    for (const type of TOUCHES) addEventListener(type, () => this.#touch(), options);
   }
 
   // Shows what is kept of a subject, if there is something.
@@ -31,13 +40,26 @@ export class LastPicture {
   }
 
   // A frame stands on the canvas.
+  painted({ scale, noise }) {
+    this.#isPainted = true;
+    if (this.#isTouched || this.image.hidden || (scale === 1 && noise !== null && noise < NOISE)) this.end();
+  }
+
+  // The canvas is seen, unless nothing stands on it.
   end() {
-    if (this.#isOver) return;
+    if (this.#isOver || !this.#isPainted) return;
     this.#isOver = true;
+    this.#listening.abort();
+    this.stage.classList.add("live");
     setTimeout(() => {
       this.image.hidden = true;
       URL.revokeObjectURL(this.image.src);
     }, FADE_MS);
+  }
+
+  #touch() {
+    this.#isTouched = true;
+    this.end();
   }
 
   // Keeps the canvas for the next visit, as a picture of a subject.

@@ -112,7 +112,7 @@ class MicrofacetMaterial(SolidSurface):
         ConductorIndex | None,
         OMITTABLE,
         hint(
-            "n (measured metal)",
+            "n (metal)",
             "The index of refraction as measured, for red, green and blue.",
             group="Specular",
             unit="",
@@ -125,7 +125,7 @@ class MicrofacetMaterial(SolidSurface):
         Extinction | None,
         OMITTABLE,
         hint(
-            "k (measured metal)",
+            "k (metal)",
             "The extinction coefficient as measured, for red, green and blue.",
             group="Specular",
             unit="",

@@ -201,7 +201,7 @@ class PrincipledMaterial(DisneyMaterial):
         ConductorIndex | None,
         OMITTABLE,
         hint(
-            "n (measured metal)",
+            "n (metal)",
             "The index of refraction as measured, for red, green and blue. With k it takes the place of the base "
             "colour.",
             group="Specular",
@@ -216,7 +216,7 @@ class PrincipledMaterial(DisneyMaterial):
         Extinction | None,
         OMITTABLE,
         hint(
-            "k (measured metal)",
+            "k (metal)",
             "The extinction coefficient as measured, for red, green and blue. It goes with n.",
             group="Specular",
             unit="",
