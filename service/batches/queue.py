@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import logging
 import time
 from collections.abc import Callable, Collection
@@ -21,6 +19,7 @@ from service.storage.asset_access import AllowedUses
 from service.system.background import Background
 from service.system.executors import parsing, recording
 from service.system.turns import CALLER
+from service.system.waiting import within
 
 EACH = 32  # batches of one owner that are under way
 AGAIN_S = 5.0  # between two attempts to queue a render where there is no room
@@ -253,5 +252,4 @@ class BatchQueue:
     @staticmethod
     async def _changed(batch: Batch, seconds: float | None = None) -> None:
         batch.changed.clear()
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(batch.changed.wait(), seconds)
+        await within(batch.changed, seconds)

@@ -10,7 +10,6 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -29,6 +28,7 @@ from service.system.background import Background, reported
 from service.system.executors import answering, recording, resolving
 from service.system.shares import Shares
 from service.system.turns import CALLER
+from service.system.waiting import within
 
 if TYPE_CHECKING:
     import ssl
@@ -142,8 +142,7 @@ class Callbacks:
                     pause = await self._begin()
                 except ServiceError as error:
                     log.error("could not send callbacks", {"error": error})
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._woken.wait(), pause)
+            await within(self._woken, pause)
 
     async def _begin(self) -> float:
         """Begin all attempts that are due and have room; the seconds until the next one."""

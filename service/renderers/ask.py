@@ -36,7 +36,8 @@ async def ask(
                 await renderers.send_scene(message)
             else:
                 renderers.send(message)
-        return await asyncio.wait_for(listener.message, patience_s)
+        async with asyncio.timeout(patience_s):
+            return await listener.message
     finally:
         renderers.drop(task)
         listener.message.cancel()

@@ -17,7 +17,6 @@ retention   which ended renders make room
 settled     ended renders of batches, which are rows of the store
 resting     ended renders whose pictures stay with the renderer
 recorder    writes what becomes of a render to the store
-waiting     waits for an event, for a time
 followers   who follows renders, and learns of their changes
 listing     lists of renders, a page at a time
 reads       requests for a picture that the renderer has not answered yet

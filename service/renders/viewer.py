@@ -13,7 +13,7 @@ from service.renderers.protocol import Listener
 from service.renders.ordered import Ordered
 from service.renders.reads import Reads
 from service.renders.status import error_of
-from service.renders.waiting import within
+from service.system.waiting import within
 
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ASK_AGAIN_S = 5  # for a client whose picture was lost with a renderer

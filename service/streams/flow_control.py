@@ -116,7 +116,8 @@ class FlowControl:
         """Returns when the present generation has been seen, or can't be, or takes too long."""
         if self._here and self.generation is not None and len(self._unacknowledged) < CREDITS:
             try:
-                await asyncio.wait_for(self._answered.wait(), PATIENCE_S)
+                async with asyncio.timeout(PATIENCE_S):
+                    await self._answered.wait()
             except TimeoutError:
                 return
 

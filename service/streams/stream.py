@@ -155,7 +155,8 @@ class Stream:
                     said = asyncio.ensure_future(self._said())
                     await asyncio.wait({said, sending}, timeout=CLOSING_S, return_when=asyncio.FIRST_COMPLETED)
                 await _stopped(sending)
-                await asyncio.wait_for(attendance.socket.close(closing.code, closing.reason), CLOSING_S)
+                async with asyncio.timeout(CLOSING_S):
+                    await attendance.socket.close(closing.code, closing.reason)
         except TimeoutError:
             return  # it takes nothing: the network's end of it is the server's business
         finally:
@@ -307,7 +308,8 @@ class Stream:
                 if isinstance(item, Frame):
                     await self._send_frame(socket, item)
                 else:
-                    await asyncio.wait_for(socket.send_text(json.dumps(item, allow_nan=False)), STALLED_S)
+                    async with asyncio.timeout(STALLED_S):
+                        await socket.send_text(json.dumps(item, allow_nan=False))
             finally:
                 self._speaking = False
                 self._stir()
@@ -319,7 +321,8 @@ class Stream:
             if self._flow.welcome(frame):
                 self._count(data)
                 self._flow.sent(frame)
-                await asyncio.wait_for(socket.send_bytes(data), STALLED_S)
+                async with asyncio.timeout(STALLED_S):
+                    await socket.send_bytes(data)
 
     def _count(self, data: bytes) -> None:
         statistics = self._renderers.statistics

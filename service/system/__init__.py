@@ -11,6 +11,7 @@ turns            whom the work at hand is for, and turns that go round these cal
 garbage          the garbage collector, out of the way of large imports
 disk_usage       what files take on a disk: blocks and inodes
 background       tasks that nobody awaits, none of which dies unseen
+waiting          waits for an event, for a time
 power            whether there is power to spare for work that nobody asked for
 executors        the threads of the server's slow work
 priority         niceness of threads and processes

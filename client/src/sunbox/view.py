@@ -220,7 +220,8 @@ class View(anywidget.AnyWidget):
     async def _soon(self) -> None:
         """When there are samples enough for a picture that is kept, or that takes too long."""
         with contextlib.suppress(TimeoutError, SunboxError):
-            await asyncio.wait_for(self._live.reached(samples=SAVED_SAMPLES), SAVED_WITHIN_S)
+            async with asyncio.timeout(SAVED_WITHIN_S):
+                await self._live.reached(samples=SAVED_SAMPLES)
 
     def framed(self, frame: Frame) -> None:
         header = {name: getattr(frame, name) for name in ("generation", "seq", "samples", "noise", "mime")}

@@ -115,7 +115,8 @@ class Keeper:
         if self._ready is None or not self.takes_tasks:
             raise Unavailable(self.detail)
         try:
-            return await asyncio.wait_for(asyncio.shield(self._ready), timeout_s)
+            async with asyncio.timeout(timeout_s):
+                return await asyncio.shield(self._ready)
         except TimeoutError:
             raise Unavailable(self.waiting or STARTING) from None
 

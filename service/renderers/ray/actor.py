@@ -18,6 +18,7 @@ from service.renderers.ray.code import version
 from service.renderers.ray.control import Ended
 from service.system.background import Background, reported
 from service.system.memory import MemoryBudget
+from service.system.waiting import within
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 WATCH_S = 0.5
@@ -78,10 +79,7 @@ class Renderer:
         outgoing, news = self._outgoing, self._news
         if not outgoing:
             news.clear()
-            try:
-                await asyncio.wait_for(news.wait(), SILENCE_S)
-            except TimeoutError:
-                return []
+            await within(news, SILENCE_S)
         heard = list(outgoing)
         outgoing.clear()
         if outgoing is self._outgoing and self._paused and self._process is not None:

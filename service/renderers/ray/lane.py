@@ -120,7 +120,8 @@ class Lane:
                 hearing.cancel()
                 if self._over.is_set():
                     with suppress(Exception):
-                        await asyncio.wait_for(_answer(actor.end.remote(FAREWELL_S)), FAREWELL_S + 1)
+                        async with asyncio.timeout(FAREWELL_S + 1):
+                            await _answer(actor.end.remote(FAREWELL_S))
         except Unfit as error:
             self._link.send(Unable(str(error)))
             return Ended("crashed")
@@ -225,7 +226,8 @@ class Lane:
 
     async def _hear_all(self, actor: Any) -> Ended:
         while True:
-            messages = await asyncio.wait_for(_answer(actor.hear.remote()), SILENCE_S)
+            async with asyncio.timeout(SILENCE_S):
+                messages = await _answer(actor.hear.remote())
             last: Ended | None = messages.pop() if messages and isinstance(messages[-1], Ended) else None
             for encoded in await asyncio.to_thread(_encoded, messages):
                 self._link.send_encoded(encoded)
