@@ -131,12 +131,11 @@ class Totals:
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         # Servers say what they have compiled when they end, after the last test.
-        if self.count.bounded and self.count.total > kernel_count.MOST:
+        if self.count.exceeded:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        bound = f" of at most {kernel_count.MOST}" if self.count.bounded else ""
-        terminalreporter.write_line(f"path kernels: {self.count.total}{bound}")
+        terminalreporter.write_line(str(self.count))
 
 
 @pytest.hookimpl(wrapper=True)

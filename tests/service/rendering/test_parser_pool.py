@@ -158,7 +158,7 @@ def test_what_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 1e-3)
     pool.parse("request", written(REQUEST))
     monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 0)
-    with pytest.raises(TooLarge, match="longer"):
+    with pytest.raises(TooLarge, match=r"longer|processor time"):
         pool.parse("request", bytearray(b"[" + b'{"a":1},' * 800_000 + b"1]"))
     assert pool._children.idle == []
     pool.close()
