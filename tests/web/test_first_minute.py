@@ -102,7 +102,7 @@ def test_the_first_picture_comes_with_the_page(editor: Editor, server: Server) -
         page.set_viewport_size({"width": width, "height": height})
         box, room = first.bounding_box(), stage.bounding_box()
         assert box is not None and room is not None
-        tall = min(room["height"], room["width"] * 9 / 16)
+        tall = min(room["height"], room["width"] * 2 / 3)
         assert [box["width"], box["height"]] == pytest.approx([room["width"], tall], abs=1)
         assert box["y"] + box["height"] / 2 == pytest.approx(room["y"] + room["height"] / 2, abs=1)
     page.goto("about:blank")
@@ -162,29 +162,3 @@ def test_a_hint_says_what_can_be_dropped_until_something_was(editor: Editor, ser
     second.page.reload()
     second.page.wait_for_selector("#library [role=option]")
     assert second.page.is_hidden("#hint")
-
-
-def test_nothing_blurred_follows_on_a_sharp_picture_unless_somebody_acts(blank: Editor) -> None:
-    seen = """async (steps) => {
-        const { LastPicture } = await import("/panels/last-picture.js");
-        const stage = document.createElement("div");
-        const image = document.createElement("img");
-        image.hidden = steps.includes("nothing kept");
-        const picture = new LastPicture(image, stage);
-        return steps.map((step) => {
-            if (typeof step === "object") picture.painted(step);
-            else if (step === "done") picture.end();
-            else dispatchEvent(new Event(step));
-            return stage.classList.contains("live");
-        });
-    }"""
-    preview, noisy, clean = {"scale": 0.25, "noise": 0.01}, {"scale": 1, "noise": 0.3}, {"scale": 1, "noise": 0.09}
-    first = {"scale": 1, "noise": None}
-    for name, (steps, expected) in {
-        "it waits until it is clean": ([preview, first, noisy, clean, noisy], [0, 0, 0, 1, 1]),
-        "whoever touches the page sees it": ([preview, "pointerdown"], [0, 1]),
-        "a touch before it": (["keydown", preview], [0, 1]),
-        "all its samples": (["done", first, "done"], [0, 0, 1]),
-        "nothing kept": (["nothing kept", preview], [0, 1]),
-    }.items():
-        assert blank.page.evaluate(seen, steps) == [bool(each) for each in expected], name

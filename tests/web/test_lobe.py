@@ -70,6 +70,8 @@ def lobe(opened: Editor) -> Editor:
     page = opened.page
     page.unroute_all(behavior="ignoreErrors")
     if page.is_visible("#comparison"):
+        if page.is_hidden("#comparison >> text=Discard B"):
+            page.click("#comparison .more-of-it")
         page.click("#comparison >> text=Discard B")
     paste(opened, {"type": "principled", "base_color": [0.8, 0.3, 0.2], "roughness": 0.3})
     page.click("#lobe [data-value=polar]")
@@ -179,7 +181,9 @@ def test_both_variants_are_drawn_over_each_other(lobe: Editor) -> None:
     paste(lobe, {"type": "principled", "roughness": 0.3})
     lobe.compare()
     page.select_option("#comparison select[aria-label^=Turn]", "disney")
+    page.click("#comparison .more-of-it")  # which lies over the lobe's views
     plotted(lobe)
+    assert page.is_hidden("#comparison .metric"), "it is about the picture, which is not seen"
     both = ["A, Principled", "B, Disney"]  # B begins as a copy of A
     lobe.wait("both", lambda: page.inner_text("#lobe .lobe-legend").split("\n") == both)
     lobe.wait("curves", lambda: page.locator("#lobe .curve").count() == 2)

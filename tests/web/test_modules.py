@@ -364,3 +364,29 @@ def test_values_that_stand_together_come_and_go_together(page: Page) -> None:
     )
     assert other == {"type": "p", "conductor_eta": 2, "conductor_k": [9, 9, 9]}
     assert call(page, "document/materials.js", "paired", other, "conductor_eta", None, partner) == {"type": "p"}
+
+
+def test_nothing_blurred_follows_on_a_sharp_picture_unless_somebody_acts(page: Page) -> None:
+    seen = """async (steps) => {
+        const { LastPicture } = await import("/panels/last-picture.js");
+        const stage = document.createElement("div");
+        const image = document.createElement("img");
+        image.hidden = steps.includes("nothing kept");
+        const picture = new LastPicture(image, stage);
+        return steps.map((step) => {
+            if (typeof step === "object") picture.painted(step);
+            else if (step === "done") picture.end();
+            else dispatchEvent(new Event(step));
+            return stage.classList.contains("live");
+        });
+    }"""
+    preview, noisy, clean = {"scale": 0.25, "noise": 0.01}, {"scale": 1, "noise": 0.3}, {"scale": 1, "noise": 0.09}
+    first = {"scale": 1, "noise": None}
+    for name, (steps, expected) in {
+        "it waits until it is clean": ([preview, first, noisy, clean, noisy], [0, 0, 0, 1, 1]),
+        "whoever touches the page sees it": ([preview, "pointerdown"], [0, 1]),
+        "a touch before it": (["keydown", preview], [0, 1]),
+        "all its samples": (["done", first, "done"], [0, 0, 1]),
+        "nothing kept": (["nothing kept", preview], [0, 1]),
+    }.items():
+        assert page.evaluate(seen, steps) == [bool(each) for each in expected], name
