@@ -9,7 +9,7 @@ import re
 import sqlite3
 import time
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -215,7 +215,13 @@ def test_fifty_thousand_ended_renders_take_rows_and_no_objects(tmp_path: Path) -
 
 
 def resident(pid: int) -> int:
-    """The bytes of memory of one process, what it shares counted in part."""
-    found = re.search(r"^Pss: +(\d+) kB", Path(f"/proc/{pid}/smaps_rollup").read_text(), re.MULTILINE)
+    """The bytes of memory of one process, what it shares counted in part. For moments Linux may refuse to tell."""
+    told = ""
+    for _ in range(50):
+        with suppress(PermissionError):
+            told = Path(f"/proc/{pid}/smaps_rollup").read_text()
+            break
+        time.sleep(0.1)
+    found = re.search(r"^Pss: +(\d+) kB", told, re.MULTILINE)
     assert found is not None
     return int(found[1]) << 10
