@@ -19,7 +19,7 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.page.click("dialog[open] [value=open]")
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
     editor.page.click("#messages summary")  # it stays while that is open
-    assert "exposure is -10 stops now" in editor.text("#messages") and "no sky" in editor.text("#messages")
+    assert "exposure was set to -10 stops" in editor.text("#messages") and "no sky" in editor.text("#messages")
     editor.tab("film")
     exposure = editor.page.locator(editor.field("exposure", "number"))
     assert exposure.input_value() == "-10"
