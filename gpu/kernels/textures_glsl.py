@@ -21,6 +21,7 @@ BASE = layout.Material.words // 4  # groups of four words of a material without 
 SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
 ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS, texture_records.HEIGHT)
 APART = (*texture_records.OTHER_RANGES, texture_records.HEIGHT)  # not sampled with what a surface is made from
+OF_BODIES = ("attenuation_color", "attenuation_distance", "ior", "specular")  # what a body's rates and its index are of
 POINTWISE = ("opacity", "cutoff", texture_records.HEIGHT)  # looked up at single points
 
 
@@ -44,6 +45,7 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     flags = np.bitwise_or.reduce(records(textures)[0]["flags"], axis=None) if textures is not None and slots else 0
     out["ANY_CLAMPED"] = int(flags & texture_records.SLOT_CLAMP > 0)
     out["ANY_MIRRORED"] = int(flags & texture_records.SLOT_MIRROR > 0)
+    out["BODIES_TEXTURED"] = int(any(name in slots for name in OF_BODIES))
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = out["TEXTURE_SURFACE_LOOP"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(textures)}u"

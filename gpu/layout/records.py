@@ -213,6 +213,7 @@ class Body(Record):
     scattering: vec3  # 1/m
     priority: f32
     emission: vec3  # W / (m^3 sr)
+    material: u32  # of the shape
 
 
 class TriangleNormals(Record):

@@ -89,7 +89,7 @@ def likely() -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]
     """What a client is likely to look at: the scene with which the editor begins, that scene of other materials, and
     the other scenes but tests."""
     shown = get("scenes", DEFAULT_SCENE)
-    edits = [_dressed(shown, get("materials", name)) for name in FAVOURITES]
+    edits = [dressed(shown, get("materials", name)) for name in FAVOURITES]
     others = [each["name"] for each in names("scenes") if each["name"] != DEFAULT_SCENE and "group" not in each]
     return shown, edits, [get("scenes", name) for name in others]
 
@@ -101,7 +101,7 @@ def subject(scene: dict[str, Any]) -> str:
     return name
 
 
-def _dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
+def dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
     """The scene with its subject made of a material of the library, which may be stored with its textures."""
     (bare,) = material["materials"].values() if "materials" in material else [material]
     more = {"textures": scene.get("textures", {}) | material["textures"]} if "textures" in material else {}

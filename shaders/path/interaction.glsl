@@ -30,8 +30,8 @@ struct Interaction {
 // Finds what the body lies in: it is around the outer side of the surface.
 void interaction_around(Material m, bool clear, Medium near, inout Interaction here) {
     here.around = 1.0;
-    if (clear && here.behind) here.around = here.beyond.bodies.indices.x;
-    if (clear && !here.behind) here.around = near.bodies.indices.x;
+    if (clear && here.behind) here.around = bodies_index(here.beyond.bodies);
+    if (clear && !here.behind) here.around = bodies_index(near.bodies);
     here.sparser = material_index(m) < here.around;
 }
 #endif

@@ -94,8 +94,8 @@ Medium medium_outside() {
     return m;
 }
 
-// A body of that material and shape.
-Medium medium_body(Material material, uint shape) {
+// What that material fills a body with.
+Medium medium_inside(Material material) {
     Medium m = medium_none();
     m.rate = surface_attenuation(material);
     m.depth = 1.0;
@@ -108,6 +108,12 @@ Medium medium_body(Material material, uint shape) {
     m.scattering = scattering;
     m.forward = material.scatter_g * dot(scattering, vec3(1.0 / 3.0));
 #endif
+    return m;
+}
+
+// A body of that material and shape.
+Medium medium_body(Material material, uint shape) {
+    Medium m = medium_inside(material);
 #if HAS_PRIORITIES
     m.bodies = bodies_one(medium_id(shape), material_index(material), m.rate, m.scattering, m.forward);
 #endif
@@ -121,11 +127,15 @@ Medium medium_body(Material material, uint shape) {
 // That of the highest of these bodies.
 Medium medium_of(Bodies bodies) {
     Medium m = medium_none();
-    m.bodies = bodies;
-    m.depth = bodies_count(bodies);
+#if BODIES_TEXTURED
     m.rate = bodies.rates[0];
     m.scattering = bodies.scattering[0];
     m.forward = bodies.forward.x;
+#else
+    if (bodies.ids.x != 0u) m = medium_inside(material_pick(body_load(bodies.ids.x).material));
+#endif
+    m.bodies = bodies;
+    m.depth = bodies_count(bodies);
     medium_fill(bodies.ids.x, 1.0, m);
     return m;
 }

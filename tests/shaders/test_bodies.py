@@ -110,16 +110,19 @@ def test_a_cavity_of_index_1(gpu: Renderer, estimator: str) -> None:
     np.testing.assert_allclose(seen(gpu, shapes, 0, max_bounces=2, estimator=estimator), passed**0.5, rtol=0.01)
 
 
-def test_only_the_highest_absorbs(gpu: Renderer) -> None:
-    tinted = {"air": clear(1, attenuation_color=[0.5, 0.5, 0.5], attenuation_distance=1.0)}
+@pytest.mark.parametrize("tint", [[0.5, 0.5, 0.5], {"texture": "grey"}], ids=["of its material", "of a texture"])
+def test_only_the_highest_absorbs(gpu: Renderer, tint: Any) -> None:
+    """What a body absorbs is its material's, or what a texture gave it where the ray came in, which is kept."""
+    tinted = {"air": clear(1, attenuation_color=tint, attenuation_distance=1.0)}
     shapes = [
         slab("air", -3, 0.5, priority=1, medium={"absorption": 0.2}),
         slab("other", -0.5, 3, medium={"absorption": 0.7}),
     ]  # fmt: skip
     white = {"type": "constant", "radiance": 1}
-    image = seen(gpu, shapes, 6, materials={**tinted, "other": clear(1)}, environment=white)
+    rest = {"environment": white, "textures": {"grey": {"type": "checker", "a": 0.5, "b": 0.5}}}
+    image = seen(gpu, shapes, 6, materials={**tinted, "other": clear(1)}, **rest)
     np.testing.assert_allclose(image, 0.5**3.5 * math.exp(-0.2 * 3.5 - 0.7 * 2.5), rtol=1e-4)
-    image = seen(gpu, shapes, 0, materials={**tinted, "other": clear(1)}, environment=white)
+    image = seen(gpu, shapes, 0, materials={**tinted, "other": clear(1)}, **rest)
     np.testing.assert_allclose(image, 0.5**3 * math.exp(-0.2 * 3), rtol=1e-4)
 
 

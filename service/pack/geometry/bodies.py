@@ -21,6 +21,8 @@ def bodies(scene: Scene) -> np.ndarray:
     ranks = [0, *(getattr(shape, "priority", 0) for shape in scene.shapes)]
     records = np.zeros(len(media) if filled or any(ranks) else 0, Body.dtype)
     records["priority"] = ranks[: len(records)]
+    numbers = {name: number for number, name in enumerate(scene.materials)}
+    records["material"][1:] = [numbers[shape.material] for shape in scene.shapes][: len(records)]
     for i, medium in filled.items():
         _fill(records[i], medium)
     return records
