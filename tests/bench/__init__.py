@@ -20,6 +20,8 @@ peer_blender    the scenes for Cycles
 device          what is to be learned of a GPU in ten minutes
 standin         how work is cut for a stand-in for a GPU, in simulated time
 profile         where the time of a path goes on llvmpipe
+registers       registers and spills of kernels on an AMD GPU, without one
+radv            what compiles them, Mesa's RADV
 soak            mixed clients for a long time
 soak_clients    the clients of `soak`
 soak_page       a user of the editor in a browser, for `soak`

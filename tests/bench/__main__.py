@@ -86,6 +86,10 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--publish", action="store_true", help="write tests/bench/profile/llvmpipe.*")
     command.add_argument("--quick", action="store_true", help="try it out on little; its figures mean nothing")
 
+    command = add("registers", _registers, "registers and spills of kernels on an AMD GPU, without one, in minutes")
+    text = "these scenes, or `ball of MATERIAL`, instead of all"
+    command.add_argument("names", nargs="*", metavar="NAME", help=text)
+
     soak.add_options(add("soak", soak.run, "mixed clients for a long time while renderers are killed", False))
     soak_restarts.add_options(
         add("restarts", soak_restarts.run, "a thousand renders while the whole server is restarted", False)
@@ -276,6 +280,23 @@ def _profile(arguments: argparse.Namespace) -> int:
     write_figures(output, document)
     if arguments.publish:
         page.publish(document)
+    return 0
+
+
+def _registers(arguments: argparse.Namespace) -> int:
+    output = output_path(arguments.output)
+    from tests.bench import radv, registers
+
+    known = [name for name, _ in registers.documents()]
+    for name in arguments.names:
+        if name not in known:
+            raise BadInput(f"{name!r}: is not one of {', '.join(known)}")
+    try:
+        rows = registers.measure(progress, arguments.names)
+    except (registers.NotCompiled, radv.NoRadv) as error:
+        raise Failed(str(error)) from None
+    print(registers.table(rows))
+    write_figures(output, rows)
     return 0
 
 
