@@ -8,15 +8,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from service import presets
+
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
-# Of the loops over a few quads and boxes, and of the tree over a thousand spheres in an image's light.
-SCENES = ("cornell-boxes", "sphere-field")
+# Of the loops over a few quads and boxes, of the tree over a thousand spheres in an image's light, and of a mesh.
+SCENES = ("cornell-boxes", "sphere-field", "shader-ball")
+REST = sorted({entry["name"] for entry in presets.names("scenes")} - {*SCENES})
 SIZE, SAMPLES = 32, 4
 PATIENCE_S = 300.0  # zink compiles a kernel in twice the time of llvmpipe, which on two busy cores is much
 SCRIPT = """
@@ -50,23 +54,24 @@ def lavapipe() -> Path | None:
     return next((path for path in (*named, *installed) if path.name.startswith("lvp_icd") and path.exists()), None)
 
 
-def rendered(out: Path, driver: str, **variables: str) -> dict[str, np.ndarray]:
+def rendered(out: Path, driver: str, scenes: Sequence[str], **variables: str) -> dict[str, np.ndarray]:
     """The scenes by a Gallium driver, and the `renderer` that it calls itself."""
     environment = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": driver, **variables}
-    command = [sys.executable, "-c", SCRIPT, str(out), str(SIZE), str(SAMPLES), *SCENES]
+    command = [sys.executable, "-c", SCRIPT, str(out), str(SIZE), str(SAMPLES), *scenes]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.returncode == 0, done.stderr[-2000:]
     return dict(np.load(out))
 
 
-def test_vulkan_renders_the_same(tmp_path: Path) -> None:
+@pytest.mark.parametrize("scenes", [SCENES, *(pytest.param([name], marks=pytest.mark.slow) for name in REST)], ids=" ".join)
+def test_vulkan_renders_the_same(tmp_path: Path, scenes: Sequence[str]) -> None:
     driver = lavapipe()
     if driver is None:
         pytest.skip("lavapipe is not installed: on Debian `apt-get install mesa-vulkan-drivers`, of Mesa's version")
-    ours = rendered(tmp_path / "llvmpipe.npz", "llvmpipe")
-    vulkan = rendered(tmp_path / "zink.npz", "zink", VK_DRIVER_FILES=str(driver))
+    ours = rendered(tmp_path / "llvmpipe.npz", "llvmpipe", scenes)
+    vulkan = rendered(tmp_path / "zink.npz", "zink", scenes, VK_DRIVER_FILES=str(driver))
     assert str(ours["renderer"]).startswith("llvmpipe") and str(vulkan["renderer"]).startswith("zink")
-    for name in SCENES:
+    for name in scenes:
         mean = float(ours[name].mean())
         assert mean > 0.1 and ours[name].std() > 0.1
         np.testing.assert_allclose(vulkan[name], ours[name], rtol=1e-5, atol=1e-5 * mean, err_msg=name)
