@@ -63,7 +63,9 @@ def rendered(out: Path, driver: str, scenes: Sequence[str], **variables: str) ->
     return dict(np.load(out))
 
 
-@pytest.mark.parametrize("scenes", [SCENES, *(pytest.param([name], marks=pytest.mark.slow) for name in REST)], ids=" ".join)
+@pytest.mark.parametrize(
+    "scenes", [SCENES, *(pytest.param([name], marks=pytest.mark.slow) for name in REST)], ids=" ".join
+)
 def test_vulkan_renders_the_same(tmp_path: Path, scenes: Sequence[str]) -> None:
     driver = lavapipe()
     if driver is None:
