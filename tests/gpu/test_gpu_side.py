@@ -77,7 +77,7 @@ def test_the_same_bits_from_wherever_it_was_saved(gpu: Renderer, hardware: None)
         np.testing.assert_array_equal(again.read(), expected)
         again.release()
         stops += 1
-    assert stops > 5
+    assert stops >= 3, "at least once a block"
 
 
 @pytest.mark.parametrize(("size", "l_ms"), [((256, 256), 0.3), ((512, 512), 3.0), ((1920, 1080), 1.0)])
