@@ -141,7 +141,7 @@ def _photograph(
         page.add_init_script("localStorage['sunbox.ui'] ??= JSON.stringify({ hint: false })")  # read by now
         # The first scene, where all of the page is shown; a quicker one, where a part of it is.
         page.goto(f"http://127.0.0.1:{port}/{'' if name in FIRST_SCENE else '#scene=sphere-on-floor'}")
-        page.wait_for_selector("#stage.live")
+        page.wait_for_selector("#stage.live", timeout=120_000)
         for act, what, value in acts:
             if act == "key":
                 page.keyboard.press(what)

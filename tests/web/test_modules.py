@@ -380,7 +380,7 @@ def test_nothing_blurred_follows_on_a_sharp_picture_unless_somebody_acts(page: P
             return stage.classList.contains("live");
         });
     }"""
-    preview, noisy, clean = {"scale": 0.25, "noise": 0.01}, {"scale": 1, "noise": 0.3}, {"scale": 1, "noise": 0.09}
+    preview, noisy, clean = {"scale": 0.25, "noise": 0.01}, {"scale": 1, "noise": 0.3}, {"scale": 1, "noise": 0.19}
     first = {"scale": 1, "noise": None}
     for name, (steps, expected) in {
         "it waits until it is clean": ([preview, first, noisy, clean, noisy], [0, 0, 0, 1, 1]),

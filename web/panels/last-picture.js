@@ -8,7 +8,7 @@ const WORK = "work"; // a scene that was changed; a built-in one has its own nam
 const LONGEST = 960; // pixels of the longer side: some 50 kB
 const FIRST = "shader-ball"; // the scene of the page's own picture
 const FADE_MS = 300; // until the canvas covers it
-const NOISE = 0.1; // with the denoiser, about as clean as what is kept
+const NOISE = 0.2; // with the denoiser, nearly as clean as what is kept: four samples of the first scene
 const TOUCHES = ["pointerdown", "keydown", "wheel", "drop"];
 
 // What a picture is of: {name, of}; `builtIn` is the name of a built-in scene as it comes, else null.
