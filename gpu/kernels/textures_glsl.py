@@ -21,7 +21,7 @@ BASE = layout.Material.words // 4  # groups of four words of a material without 
 SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
 ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS, texture_records.HEIGHT)
 APART = (*texture_records.OTHER_RANGES, texture_records.HEIGHT)  # not sampled with what a surface is made from
-OF_BODIES = ("attenuation_color", "attenuation_distance", "ior", "specular")  # what a body's rates and its index are of
+OF_BODIES = ("attenuation_color", "attenuation_distance", "ior", "specular")  # what gives rates and an index
 POINTWISE = ("opacity", "cutoff", texture_records.HEIGHT)  # looked up at single points
 
 
