@@ -102,7 +102,7 @@ def test_the_first_picture_comes_with_the_page(editor: Editor, server: Server) -
         page.set_viewport_size({"width": width, "height": height})
         box, room = first.bounding_box(), stage.bounding_box()
         assert box is not None and room is not None
-        tall = min(room["height"], room["width"] * 2 / 3)
+        tall = min(room["height"], room["width"] * 9 / 16)
         assert [box["width"], box["height"]] == pytest.approx([room["width"], tall], abs=1)
         assert box["y"] + box["height"] / 2 == pytest.approx(room["y"] + room["height"] / 2, abs=1)
     page.goto("about:blank")

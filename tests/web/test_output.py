@@ -79,9 +79,9 @@ def plain(text: str) -> str:
 def test_a_picture_is_rendered_in_any_size_and_saved(editor: Editor) -> None:
     page = editor.page
     editor.tab("render")
-    assert size(editor) == [1800, 1200], "unless somebody says otherwise"
+    assert size(editor) == [1920, 1080], "unless somebody says otherwise"
     ratio = "picture.width / picture.height"
-    editor.wait("what will be in it", lambda: page.evaluate(ratio) == pytest.approx(3 / 2, 0.02))
+    editor.wait("what will be in it", lambda: page.evaluate(ratio) == pytest.approx(16 / 9, 0.02))
     stage_ratio = page.evaluate("stage.clientWidth / stage.clientHeight")
     picker = page.get_by_label("Size", exact=True)
     picker.select_option("As the window")

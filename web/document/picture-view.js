@@ -11,8 +11,8 @@ const PAINTED = ["depth", "variance", "shape_id", "material_id"];
 
 export const isPainted = (aov) => PAINTED.includes(aov);
 
-// The sides of a final picture, unless somebody says otherwise: the shape of a photograph, which stages have room for.
-export const FINAL = { width: 1800, height: 1200 };
+// The sides of a final picture, unless somebody says otherwise: stages have room above and below it for tools and state.
+export const FINAL = { width: 1920, height: 1080 };
 
 // Of the box, the largest part with these sides' proportions.
 export function contained(box, { width, height }) {

@@ -6,8 +6,7 @@ export const WINDOW = "window";
 export const CUSTOM = "custom";
 
 export const SIZES = {
-  photo: { title: "Photo", ...FINAL },
-  hd: { title: "HD", width: 1920, height: 1080 },
+  hd: { title: "HD", ...FINAL },
   "4k": { title: "4K", width: 3840, height: 2160 },
   square: { title: "Square", width: 1080, height: 1080 },
   story: { title: "Story", width: 1080, height: 1920 },
@@ -20,7 +19,7 @@ const ratioOf = (shape) => shape.split(":").reduce((a, b) => Number(a) / Number(
 const across = (shape, height) => Math.max(1, Math.round(height * ratioOf(shape)));
 const down = (shape, width) => Math.max(1, Math.round(width / ratioOf(shape)));
 
-export const STANDARD = "photo"; // unless somebody says otherwise
+export const STANDARD = "hd"; // unless somebody says otherwise
 
 // The size that a choice stands for, beside the one that is there and that of the window.
 export function sizeOf(choice, present, screen) {
