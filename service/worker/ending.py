@@ -119,7 +119,16 @@ class Ending:
         """The warnings about the picture, for the user."""
         warnings = list(self._residency.full.warnings) if self._residency.loaded is not None else []
         why = self._frames.denoising.warning
-        return warnings + ([why] if why else [])
+        return [*warnings, *([why] if why else []), *self._overrun()]
+
+    def _overrun(self) -> list[str]:
+        """A warning where the time was over before the first sample was whole."""
+        limit_s, took_s = self._tracker.stop.time_limit, self._tracker.clock.elapsed_s
+        if limit_s is None or self._tracker.reason != "time_limit" or self._residency.full.samples != 1:
+            return []
+        if took_s <= 1.5 * limit_s:
+            return []
+        return [f"the first sample took {took_s:.3g} s, longer than time_limit ({limit_s:.3g} s); it was finished"]
 
     def report(self) -> None:
         """Report a render's progress now and then; a stream reports it with each frame."""

@@ -225,6 +225,7 @@ def test_time_limit_is_kept_and_ends_between_samples(
     assert rendered("by-samples", f"max_samples={told['samples']}")[1] == picture
     told, _ = rendered("first", "time_limit=0.001", 300)
     assert (told["reason"], told["samples"]) == ("time_limit", 1)
+    assert any("first sample took" in warning for warning in told["warnings"]), told["warnings"]
     assert told["elapsed_s"] == pytest.approx(0.09, rel=0.2)
 
 
