@@ -117,9 +117,10 @@ class Ending:
     @property
     def warnings(self) -> list[str]:
         """The warnings about the picture, for the user."""
-        warnings = list(self._residency.full.warnings) if self._residency.loaded is not None else []
+        known = self._residency.loaded is not None
+        warnings = [*self._residency.full.warnings, *self._overrun()] if known else []
         why = self._frames.denoising.warning
-        return [*warnings, *([why] if why else []), *self._overrun()]
+        return warnings + ([why] if why else [])
 
     def _overrun(self) -> list[str]:
         """A warning where the time was over before the first sample was whole."""
