@@ -1,4 +1,5 @@
-"""Kernels that are compiled for nobody who is there: at the lowest priority, one at a time, and within a bound."""
+"""Kernels that are compiled for nobody who is there: at the lowest priority, one for each idle compiler, and within a
+bound."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ LONGEST_S = 10.0  # that one kernel takes: none is begun for which less is left
 
 
 class ForeseenKernels:
-    """Handed to the compiler one at a time: those that were used here before, then those of scenes with which a
+    """Handed to the compilers one by one: those that were used here before, then those of scenes with which a
     client may begin or go on, then those of panels."""
 
     def __init__(self, compiler: CompileClient, bounded: bool = True) -> None:

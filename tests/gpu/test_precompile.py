@@ -205,7 +205,7 @@ class Instant:
 
 def compiling_instantly(gpu: Renderer, priority: Priority) -> tuple[CompileClient, Instant]:
     compiler, helper = CompileClient(gpu.info, None), Instant()
-    compiler._lanes[priority].helper = helper  # type: ignore[assignment]
+    compiler._lanes[priority][0].helper = helper  # type: ignore[assignment]
     return compiler, helper
 
 
@@ -228,7 +228,7 @@ def test_what_may_be_needed_some_time_waits_for_the_first_minute(gpu: Renderer, 
     compiler.hear()
     assert helper.asked == [] and not compiler.is_idle("spare")
     assert compiler.left_s == pytest.approx(SPARE_AFTER_S, abs=15)
-    compiler._lanes["spare"].begins = 0.0
+    compiler._lanes["spare"][0].begins = 0.0
     compiler.hear()
     assert helper.asked == common_keys()[:1]
 
@@ -250,8 +250,8 @@ def test_what_somebody_waits_for_stands_behind_nothing_foreseen(gpu: Renderer, c
     compiler, urgent = compiling_instantly(gpu, "now")
     foreseen: dict[Priority, Instant] = {"soon": Instant(), "spare": Instant()}
     for priority, helper in foreseen.items():
-        compiler._lanes[priority].helper = helper  # type: ignore[assignment]
-    compiler._lanes["spare"].begins = 0.0
+        compiler._lanes[priority][0].helper = helper  # type: ignore[assignment]
+    compiler._lanes["spare"][0].begins = 0.0
     keys, ended = common_keys(), list[float]()
     compiler.prepare(keys[:3], "spare")
     compiler.prepare(keys[3:5], "soon")

@@ -31,6 +31,8 @@ SPARE_LIMIT_S = 3600.0  # ... and for one that gets no more of the processor tha
 # Bytes that a process may take for kernels, beside its context, by whether the processor is the device: LLVM was seen
 # to take 0.7 GB for one. Never more than half of the machine's memory.
 MEMORY = {True: 2 << 30, False: 8 << 30}
+# Processes of a priority beside a GPU, whose context takes up to 0.4 GB of it, and the machine's cores for each.
+MOST_COMPILERS, CORES_A_COMPILER = 4, 4
 REFUSED_S = 600.0  # before a kernel that failed is tried again
 ALONE_S = 60.0  # for which kernels are compiled by the renderer where no process could be started
 # What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then, or
@@ -51,10 +53,10 @@ log = logging.getLogger(__name__)
 class CompileClient:
     """A queue of kernels with three priorities, and which kernels need not be compiled any more.
 
-    Each priority has a process of its own, which starts at the first request and ends when idle for a while. So the
-    system preempts what is foreseen where somebody waits, and nothing is lost: one process could only be killed, and
-    would begin again with up to a minute of compiling, after 0.4 s of a core for its start. Nor can a process that
-    has lowered its priority raise it again."""
+    Each priority has processes of its own, which start at the first request and end when idle for a while: one, or
+    several where a GPU renders and leaves the cores idle. So the system preempts what is foreseen where somebody
+    waits, and nothing is lost: one process for all could only be killed, and would begin again with up to a minute of
+    compiling, after 0.4 s of a core for its start. Nor can a process that has lowered its priority raise it again."""
 
     def __init__(
         self,
@@ -76,37 +78,47 @@ class CompileClient:
         self._known: set[KernelKey] = set()  # kernels that are compiled, or that the driver does not keep
         self._refused: dict[KernelKey, tuple[str, float]] = {}  # why, and until when it holds
         self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
-        self._lanes = dict[Priority, Lane]()
+        self._lanes: dict[Priority, list[Lane]] = {}
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
         memory = compiler_memory(info)
         given += ["--memory", str(memory)]
         for each in get_args(Priority):
-            line = lifeline if each == "now" else None
-            helper = HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line)
-            self._lanes[each] = Lane(helper, LIMIT_S if each == "now" else SPARE_LIMIT_S, memory)
-        self._lanes["spare"].begins = time.monotonic() + SPARE_AFTER_S
+            line, limit_s = (lifeline, LIMIT_S) if each == "now" else (None, SPARE_LIMIT_S)
+            begins = time.monotonic() + SPARE_AFTER_S if each == "spare" else 0.0
+            self._lanes[each] = [
+                Lane(
+                    HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line),
+                    limit_s, memory, begins,
+                )
+                for _ in range(compilers(info["software"], len(os.sched_getaffinity(0))))
+            ]  # fmt: skip
+
+    @property
+    def _all_lanes(self) -> Iterator[Lane]:
+        return (lane for lanes in self._lanes.values() for lane in lanes)
 
     @property
     def ends(self) -> list[socket.socket]:
         """The sockets to wait on."""
-        return [end for lane in self._lanes.values() for end in lane.helper.ends]
+        return [end for lane in self._all_lanes for end in lane.helper.ends]
 
     @property
     def left_s(self) -> float | None:
         """In how many seconds `hear` has to look whether a kernel takes too long; None: there is none under way."""
-        return min((left for lane in self._lanes.values() if (left := lane.left_s) is not None), default=None)
+        return min((left for lane in self._all_lanes if (left := lane.left_s) is not None), default=None)
 
     @property
     def spare_s(self) -> float:
         """Seconds of a processor that went into kernels that nobody waited for."""
-        return self._lanes["soon"].spent_s + self._lanes["spare"].spent_s
+        return sum(lane.spent_s for lane in (*self._lanes["soon"], *self._lanes["spare"]))
 
     def used(self) -> Iterator[KernelKey]:
         """The kernels that pictures were made with on this machine, the latest first."""
         return self._used.latest_first()
 
     def is_idle(self, priority: Priority) -> bool:
-        return not self._lanes[priority].wanted
+        """Whether one of its processes has nothing to do."""
+        return not all(lane.wanted for lane in self._lanes[priority])
 
     def knows(self, key: KernelKey) -> bool:
         """Whether nobody needs to wait for this kernel any more."""
@@ -127,29 +139,29 @@ class CompileClient:
 
         False: use it now. It is compiled already, or no process can compile it. Raises CompileError where it was
         found that none can be made."""
-        lane = self._lanes["now"]
-        lane.forget(done)
+        for lane in self._lanes["now"]:
+            lane.forget(done)
         if self._is_compiled(key):
             return False
         if (detail := self._refusal(key)) is not None:
             raise CompileError(f"the scene's kernel could not be compiled: {detail}")
-        return self._add(lane, key, done, client)
+        return self._add("now", key, done, client)
 
     def prepare(self, keys: list[KernelKey], priority: Priority, client: str = "", done: Done | None = None) -> None:
         """Queue the kernels that are not compiled, although nobody waits for them. With `done` they take the place of
         those that were prepared with it before."""
         if not self.foresees:
             return
-        lane = self._lanes[priority]
         if done is not None:
-            lane.forget(done)
+            for lane in self._lanes[priority]:
+                lane.forget(done)
         for key in keys:
             if not self._is_compiled(key) and self._refusal(key) is None:
-                self._add(lane, key, done or _nobody, client)
+                self._add(priority, key, done or _nobody, client)
 
     def forget(self, done: Done) -> None:
         """Drop what one caller waits for, or had foreseen; a kernel that nobody else wants is not begun."""
-        for lane in self._lanes.values():
+        for lane in self._all_lanes:
             lane.forget(done)
 
     def met(self, key: KernelKey) -> None:
@@ -168,24 +180,25 @@ class CompileClient:
 
     def hear(self) -> None:
         """Call those whose kernels are compiled, and begin the next ones."""
-        for lane in self._lanes.values():
+        for lane in self._all_lanes:
             self._hear(lane)
         self._give_way()
 
     def close(self) -> None:
-        for lane in self._lanes.values():
+        for lane in self._all_lanes:
             lane.helper.close()
 
     def _give_way(self) -> None:
         """Compile nothing for nobody where somebody waits for a kernel: on two cores that took 1.5 times as long."""
-        is_waited_for = self._lanes["now"].key is not None
-        for lane in (self._lanes["soon"], self._lanes["spare"]):
-            lane.pause(is_waited_for)
+        waited_for, *others = self._lanes["now"]
+        for lane in (*self._lanes["soon"], *self._lanes["spare"]):
+            lane.pause(waited_for.key is not None and not others)
             if lane.is_due:
                 self._begin(lane)
 
-    def _add(self, lane: Lane, key: KernelKey, done: Done, client: str) -> bool:
-        """Queue a kernel or join who waits for it. False: no helper can be started."""
+    def _add(self, priority: Priority, key: KernelKey, done: Done, client: str) -> bool:
+        """Queue a kernel, where the line is shortest, or join who waits for it. False: no helper can be started."""
+        lane = min(self._lanes[priority], key=lambda lane: (key not in lane.wanted, len(lane.wanted)))
         if key in lane.wanted:
             lane.wanted[key][done] = client
         elif self.able:
@@ -265,6 +278,11 @@ class CompileClient:
         if len(self._refused) >= REMEMBERED:
             self._refused.clear()
         self._refused[key] = detail, time.monotonic() + REFUSED_S
+
+
+def compilers(is_software: bool, cores: int) -> int:
+    """How many processes a priority has. On the processor one: it takes the time of those who trace."""
+    return 1 if is_software else max(1, min(MOST_COMPILERS, cores // CORES_A_COMPILER))
 
 
 def compiler_memory(info: dict[str, Any]) -> int:

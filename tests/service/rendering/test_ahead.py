@@ -68,7 +68,7 @@ def test_only_what_somebody_waits_for_is_compiled_without_it(
 ) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
     compiler, helper = CompileClient(gpu.info, None, foresees=False), Helper()
-    for lane in compiler._lanes.values():
+    for lane in compiler._all_lanes:
         lane.helper = helper  # type: ignore[assignment]
         lane.begins = 0.0
     compiler.prepare(common_keys(), "soon")

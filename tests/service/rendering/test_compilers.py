@@ -12,7 +12,7 @@ from gpu import CompileError, Renderer
 from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc import channel
 from service.worker.helpers import compile_client
-from service.worker.helpers.compile_client import ALONE_S, REFUSED_S, CompileClient
+from service.worker.helpers.compile_client import ALONE_S, REFUSED_S, CompileClient, compilers
 from service.worker.helpers.compile_lane import MOST_KERNELS, MOST_RESIDENT, TRIES, Compiled, Started
 from tests.serving import PATIENCE_S
 from tests.supervisors import SETTINGS, arrays_of
@@ -29,7 +29,10 @@ class Processes:
         self.begun = 0
         self.asked: list[int] = []  # which of `KEYS`
         self._answers, self._exit_code = list(answers), 0
-        self._works = False
+        self._works = self.paused = False
+
+    def pause(self, is_paused: bool) -> None:
+        self.paused = is_paused
 
     def ask(self, key: object) -> None:
         if self.process_id is None:
@@ -65,7 +68,7 @@ def now(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[float]:
 
 def client(gpu: Renderer, *answers: Started | Compiled | int) -> tuple[CompileClient, Processes]:
     compiler, processes = CompileClient(gpu.info, None, foresees=False), Processes(*answers)
-    compiler._lanes["now"].helper = processes  # type: ignore[assignment]
+    compiler._lanes["now"][0].helper = processes  # type: ignore[assignment]
     return compiler, processes
 
 
@@ -166,3 +169,26 @@ def test_a_process_gets_no_more_memory_than_it_may_take(
             compiler.queue(key, done.append)
     finally:
         compiler.close()
+
+
+def test_kernels_are_compiled_side_by_side_where_a_gpu_leaves_the_cores_idle(
+    gpu: Renderer, now: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compile_client, "compilers", lambda is_software, cores: 2)
+    compiler, done = CompileClient(gpu.info, None), list[float]()
+    processes = {each: [Processes(STARTED, DONE, STARTED, DONE) for _ in range(2)] for each in ("now", "spare")}
+    for priority, helpers in processes.items():
+        for lane, helper in zip(compiler._lanes[priority], helpers, strict=True):  # type: ignore[index]
+            lane.helper, lane.begins = helper, 0.0  # type: ignore[assignment]
+    compiler.prepare([KEYS[2]], "spare")
+    assert compiler.is_idle("spare"), "there is another one"
+    for key in (KEYS[0], KEYS[1], KEYS[0]):
+        assert compiler.queue(key, lambda milliseconds, key=key: done.append(milliseconds))  # type: ignore[misc]
+    assert [helper.asked for helper in processes["now"]] == [[0], [1]]
+    assert processes["spare"][0].asked == [2] and not processes["spare"][0].paused
+    heard(compiler)
+    assert done == [1.0] * 3 and all(compiler.has(key) for key in KEYS[:3])
+
+
+def test_a_processor_that_renders_has_one_compiler() -> None:
+    assert [compilers(True, 64), compilers(False, 2), compilers(False, 16), compilers(False, 64)] == [1, 1, 4, 4]

@@ -100,7 +100,7 @@ class Looping:
         memory = heartbeat.memory()
         self._loop = Loop(its, renderer, heartbeat.Heartbeat(memory), 1 << 30, None, 1.0, ahead="off")
         os.close(memory)
-        self._loop._compiler._lanes["now"].helper = self.compiler  # type: ignore[assignment]
+        self._loop._compiler._lanes["now"][0].helper = self.compiler  # type: ignore[assignment]
         self._heard: list[Any] = []
 
     def send(self, *messages: ToRenderer) -> None:

@@ -140,7 +140,7 @@ def test_what_nobody_waits_for_stands_still_while_somebody_does(
 ) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
     compiler, helpers = CompileClient(gpu.info, None), {}
-    for priority, lane in compiler._lanes.items():
+    for priority, (lane,) in compiler._lanes.items():
         helpers[priority] = helper = Helper()
         lane.helper, lane.begins = helper, 0.0  # type: ignore[assignment]
     first, second, third, fourth = common_keys()[:4]
@@ -149,7 +149,7 @@ def test_what_nobody_waits_for_stands_still_while_somebody_does(
     assert compiler.queue(second, lambda milliseconds: None)
     assert helpers["soon"].paused, "the one under way"
     compiler.prepare([third], "spare")
-    assert helpers["spare"].asked == [] and compiler._lanes["spare"].left_s is None, "and none is begun"
+    assert helpers["spare"].asked == [] and compiler._lanes["spare"][0].left_s is None, "and none is begun"
     helpers["now"].answers.append(Compiled(1.0, True))
     compiler.hear()
     assert not helpers["soon"].paused and helpers["spare"].asked == [third]
