@@ -9,6 +9,7 @@ errors      what can go wrong on the GPU
 context     a headless OpenGL context
 egl         EGL's devices; a context that says when its device was reset
 denoise     Open Image Denoise over pixels that were read back; public, without GL
+oidn        the same library on the GPU that renders; public, without GL
 footprint   how many bytes of the device a scene and a picture take
 jit         machine code for the few loops that numpy cannot express
 layout      the bytes that the host and the shaders share; public, without GL

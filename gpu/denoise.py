@@ -1,11 +1,13 @@
-"""Open Image Denoise over pixels that were read back. Runs without GL, on the processor, off the render loop.
+"""Open Image Denoise over pixels that were read back. Runs without GL, off the render loop: on the processor, or by
+`oidn.GpuFilter` on the GPU.
 
 Attila Afra, "Intel Open Image Denoise" 2.5; a network trained on noisy renderings. It is biased: `sunbox bench
-tradeoff` says by how much. It gives the same bits for the same pixels on the same processor.
+tradeoff` says by how much. It gives the same bits for the same pixels on the same processor; no GPU promises that.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from importlib import metadata, util
 
@@ -18,14 +20,18 @@ SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's paddin
 # In units of the picture's typical radiance: brighter pixels stay as they were rendered. The network's curve ends at
 # 65504, and beyond that it invents values (1e20 came out as 3.5e20).
 BRIGHTEST = 1e4
+PROCESSOR = "the processor"
 _LUMINANCE = np.array(LUMINANCE)
 
+# Colour, albedo and normal, and whether it is to err less, as `denoise` passes them on; what comes back is colour.
+Filter = Callable[[np.ndarray, np.ndarray | None, np.ndarray | None, bool], np.ndarray]
 
-def version() -> str | None:
-    """The library's version, read without loading it; None where it is not installed."""
+
+def version(place: str = "") -> str | None:
+    """The library's version, read without loading it, and the place where it runs; None where it is not installed."""
     if util.find_spec("pyoidn") is None:
         return None
-    return f"Open Image Denoise (pyoidn {metadata.version('pyoidn')})"
+    return f"Open Image Denoise (pyoidn {metadata.version('pyoidn')})" + (place and f" on {place}")
 
 
 @cache
@@ -40,12 +46,26 @@ def missing() -> str | None:
     return None
 
 
-def denoise(color: np.ndarray, albedo: np.ndarray | None, normal: np.ndarray | None, fine: bool = True) -> np.ndarray:
+def on_processor(color: np.ndarray, albedo: np.ndarray | None, normal: np.ndarray | None, fine: bool) -> np.ndarray:
+    """What the library makes of (height, width, 3) float32. Raises RuntimeError where it fails."""
+    import pyoidn
+
+    smooth: np.ndarray = pyoidn.denoise(color, albedo, normal, hdr=True, quality="high" if fine else "fast")
+    return smooth
+
+
+def denoise(
+    color: np.ndarray,
+    albedo: np.ndarray | None,
+    normal: np.ndarray | None,
+    fine: bool = True,
+    by: Filter = on_processor,
+) -> np.ndarray:
     """The picture without its noise: `color` (height, width, 4) linear float32, premultiplied; alpha stays as it is.
 
     `albedo` 0..1 and `normal` -1..1, (height, width, 3), are averages over the first hits, or both None. `fine` takes
     twice as long and errs less. Finite and non-negative where `color` is; black and tiny pictures come back as they
-    are. Raises RuntimeError where the library fails.
+    are. `by`: what the library's filter runs on. Raises RuntimeError where that fails.
     """
     height, width = color.shape[:2]
     alpha = color[..., 3:]
@@ -53,16 +73,13 @@ def denoise(color: np.ndarray, albedo: np.ndarray | None, normal: np.ndarray | N
     typical = _typical(seen)
     if typical == 0 or min(height, width) < SMALLEST:
         return color
-    import pyoidn
-
     with np.errstate(over="ignore"):  # pixels that become infinite are left as they were rendered
         relative = (seen / np.float64(typical)).astype(np.float32)  # the library's own exposure fails below 1e-10
-    smooth = pyoidn.denoise(
+    smooth = by(
         np.minimum(relative, np.float32(BRIGHTEST)),
         None if albedo is None else np.clip(albedo, 0, 1).astype(np.float32),
         None if normal is None else np.clip(normal, -1, 1).astype(np.float32),
-        hdr=True,
-        quality="high" if fine else "fast",
+        fine,
     )
     keep = (relative.max(axis=2, keepdims=True) >= BRIGHTEST) | ~np.isfinite(smooth).all(axis=2, keepdims=True)
     out = color.copy()

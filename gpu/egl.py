@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 PLATFORM_DEVICE, OPENGL_API = 0x313F, 0x30A2  # EGL_PLATFORM_DEVICE_EXT, EGL_OPENGL_API
@@ -18,6 +19,8 @@ RESETS = {0x8253: "by what it was doing", 0x8254: "by another program", 0x8255: 
 # What EGL tells of a device: EGL_EXT_device_query, _device_drm, _device_query_name and _device_persistent_id, and
 # EGL_NV_device_cuda.
 EXTENSIONS, VENDOR, DRM_FILE, RENDERER, UUID, CUDA_DEVICE = 0x3055, 0x3053, 0x3233, 0x335F, 0x335C, 0x323A
+DRM_CLASS = Path("/sys/class/drm")
+VENDORS = {"0x1002": "AMD", "0x8086": "Intel", "0x10de": "NVIDIA"}  # by their numbers on the PCI bus
 
 Pointer = ctypes.c_void_p
 
@@ -28,13 +31,14 @@ class EglError(Exception):
 
 @dataclass(frozen=True)
 class Device:
-    """One of EGL's devices: its `name` as far as EGL says it, its number among CUDA's devices, and its UUID, 32
-    hexadecimal digits; None and "" where EGL does not say."""
+    """One of EGL's devices: its `name` as far as EGL says it, its number among CUDA's devices, its UUID, 32
+    hexadecimal digits, and its place on the PCI bus, 0000:01:00.0; None and "" where EGL does not say."""
 
     name: str
     software: bool
     cuda: int | None = None
     uuid: str = ""
+    pci: str = ""
 
 
 class EglContext:
@@ -134,18 +138,30 @@ class Questions:
 
 def described(ask: Questions, device: Any) -> Device:
     extensions = ask.string(device, EXTENSIONS).split()
-    names = []
+    file = ask.string(device, DRM_FILE) if "EGL_EXT_device_drm" in extensions else ""
+    vendor, pci = _on_bus(file)
+    names = [vendor, file]  # Mesa's EGL says no more
     if "EGL_EXT_device_query_name" in extensions:
-        names = [ask.string(device, VENDOR), ask.string(device, RENDERER)]
-    if "EGL_EXT_device_drm" in extensions:
-        names.append(ask.string(device, DRM_FILE))
+        names = [ask.string(device, VENDOR), ask.string(device, RENDERER), file]
     software = "EGL_MESA_device_software" in extensions
     return Device(
         "software" if software else ", ".join(filter(None, names)) or "GPU",
         software,
         ask.number(device, CUDA_DEVICE) if "EGL_NV_device_cuda" in extensions else None,
         ask.binary(device, UUID).hex() if "EGL_EXT_device_persistent_id" in extensions else "",
+        pci,
     )
+
+
+def _on_bus(file: str) -> tuple[str, str]:
+    """The vendor of the device with this file, /dev/dri/card0, and its place on the PCI bus; "" where Linux does not
+    say."""
+    folder = DRM_CLASS / Path(file).name / "device"
+    try:
+        vendor, place = (folder / "vendor").read_text().strip(), folder.resolve().name
+    except OSError:
+        return "", ""
+    return VENDORS.get(vendor, ""), place
 
 
 def _handles(egl: ctypes.CDLL) -> list[int | None]:

@@ -65,7 +65,7 @@ LAYERS = [
     {"service.cli"},
 ]
 GPU_LAYERS = [
-    {"gpu.layout", "gpu.egl", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"},
+    {"gpu.layout", "gpu.egl", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.oidn", "gpu.denoise"},
     {"gpu.tables", "gpu.accel"},
     {"gpu.arrays", "gpu.context", "gpu.footprint"},
     {"gpu.kernels"},
@@ -79,12 +79,13 @@ GPU_LAYERS = [
 RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analysis")
 LOOKS_INTO_GPU = {
     "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables", "gpu.jit"),
-    "service.worker": RUNS_KERNELS,
+    "service.worker": (*RUNS_KERNELS, "gpu.oidn"),
     "service.commands": ("gpu", "gpu.errors", "gpu.denoise"),
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
 WITHOUT_GL = (
-    "gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"
+    "gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.oidn",
+    "gpu.denoise",
 )  # fmt: skip
 GL_SIDE = (
     "gpu.context",

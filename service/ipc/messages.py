@@ -219,7 +219,7 @@ class EvaluateBsdf:
 
 @dataclass(frozen=True)
 class Ready:
-    info: dict[str, Any]  # of the GL implementation
+    info: dict[str, Any]  # of the GL implementation; sent again, it has what has changed
 
     @property
     def driver(self) -> str:

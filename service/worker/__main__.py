@@ -85,7 +85,9 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     # Not earlier: beside a dozen busy programs, starting at this priority took 30 s instead of 3 s.
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + arguments.nice)
     limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
-    told = {"denoiser": denoise.version(), "memory_limit": None if limit == UNLIMITED else limit}
+    # Beside a GPU the denoiser's own process knows: the loop says it later.
+    place = denoise.PROCESSOR if renderer.info["software"] else ""
+    told = {"denoiser": denoise.version(place), "memory_limit": None if limit == UNLIMITED else limit}
     channel.send(end, Ready({**renderer.info, **told}))
     log.info("started", {"driver": renderer.info.get("renderer")})
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):

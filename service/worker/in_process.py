@@ -27,6 +27,7 @@ class InProcessRenderer:
     def __init__(self, device: int | None) -> None:
         self._renderer = Renderer(device)
         self.info = self._renderer.info
+        self._gpu = None if self.info["software"] else device or 0  # EGL's number
 
     def __enter__(self) -> Self:
         return self
@@ -38,7 +39,7 @@ class InProcessRenderer:
         self, arrays: SceneArrays, settings: ResolvedSettings, listener: Callable[[FromRenderer], None]
     ) -> InProcessRender:
         """Begin a render; `listener` gets the messages that a server would get."""
-        return InProcessRender(self._renderer, arrays, settings, listener)
+        return InProcessRender(self._renderer, arrays, settings, listener, self._gpu)
 
     def features(self, arrays: SceneArrays) -> tuple[str, ...]:
         """The features that the scene's kernel is compiled for; nothing is compiled."""
@@ -73,10 +74,12 @@ class InProcessRender:
         arrays: SceneArrays,
         settings: ResolvedSettings,
         listener: Callable[[FromRenderer], None],
+        gpu: int | None,
     ) -> None:
+        """`gpu`: EGL's number of the device, where that is no processor."""
         self._listener = listener
         self._image: Image | None = None
-        self._denoiser = DenoiseClient()
+        self._denoiser = DenoiseClient(gpu)
         self._task = Task(WorkerContext(renderer, self._receive, self._denoiser), NUMBER)
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
         self._task.update(Update(NUMBER, 1, arrays, settings.for_gpu(), stop, denoise=settings.denoise))

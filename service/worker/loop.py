@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from gpu import DeviceLost, GpuError, OutOfMemory, Renderer, SceneTooLarge
+from gpu import DeviceLost, GpuError, OutOfMemory, Renderer, SceneTooLarge, denoise
 from gpu.precompile import kernel_keys
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
@@ -23,6 +23,7 @@ from service.ipc.messages import (
     Foresee,
     FromRenderer,
     Read,
+    Ready,
     Restore,
     ToRenderer,
     Update,
@@ -77,7 +78,8 @@ class Loop:
             lambda: renderer.shared_bytes,
         )
         self._scheduler = Scheduler()
-        self._denoiser = DenoiseClient()
+        gpu = None if renderer.info["software"] else device or 0
+        self._denoiser = DenoiseClient(gpu, self._tell_denoiser)
         self._compiler = CompileClient(renderer.info, device, lifeline, foresees)
         # A GPU's driver has no such choice.
         looks = foresees and renderer.info["software"] and self._compiler.able
@@ -101,6 +103,7 @@ class Loop:
     def run(self) -> None:
         """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
         self._compiler.prepare(kernel_keys.common_keys(), "soon")
+        self._denoiser.locate()
         busy = False
         while True:
             busy = self.step(wait=not busy)
@@ -127,6 +130,9 @@ class Loop:
         busy = any(each.ready for each in self._everyone)
         self._account(at_once=not busy)
         return self._foreseen.prepare() or busy
+
+    def _tell_denoiser(self, place: str) -> None:
+        self._send(Ready({"denoiser": denoise.version(place)}))
 
     @property
     def _everyone(self) -> list[Turns]:

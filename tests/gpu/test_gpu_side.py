@@ -295,14 +295,24 @@ class Card:
     ("extensions", "expected"),
     [
         ("", egl.Device("GPU", False)),
-        ("EGL_MESA_device_software EGL_EXT_device_drm", egl.Device("software", True)),
-        ("EGL_EXT_device_drm", egl.Device("/dev/dri/card1", False)),
-        ("EGL_EXT_device_query_name EGL_EXT_device_drm", egl.Device("NVIDIA, H200, /dev/dri/card1", False)),
+        ("EGL_MESA_device_software EGL_EXT_device_drm", egl.Device("software", True, pci="0000:0a:00.0")),
+        ("EGL_EXT_device_drm", egl.Device("AMD, /dev/dri/card1", False, pci="0000:0a:00.0")),
+        (
+            "EGL_EXT_device_query_name EGL_EXT_device_drm",
+            egl.Device("NVIDIA, H200, /dev/dri/card1", False, pci="0000:0a:00.0"),
+        ),
         ("EGL_NV_device_cuda EGL_EXT_device_persistent_id", egl.Device("GPU", False, 3, "0a" * 16)),
     ],
 )
-def test_what_egl_says_of_a_device(extensions: str, expected: egl.Device) -> None:
-    """Nothing is asked that it does not know."""
+def test_what_egl_and_linux_say_of_a_device(
+    extensions: str, expected: egl.Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is asked that EGL does not know; the vendor is Linux' where EGL has none."""
+    monkeypatch.setattr(egl, "DRM_CLASS", tmp_path)
+    (tmp_path / "card1").mkdir()
+    (tmp_path / "0000:0a:00.0").mkdir()
+    (tmp_path / "0000:0a:00.0" / "vendor").write_text("0x1002\n")
+    (tmp_path / "card1" / "device").symlink_to("../0000:0a:00.0")
     said = {egl.VENDOR: "NVIDIA", egl.RENDERER: "H200", egl.DRM_FILE: "/dev/dri/card1", egl.CUDA_DEVICE: 3,
             egl.UUID: b"\n" * 16}  # fmt: skip
     card: Any = Card(extensions, said)

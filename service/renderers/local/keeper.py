@@ -163,6 +163,9 @@ class Keeper:
 
     def _is_ready(self, message: Ready) -> None:
         assert self.process is not None
+        if self.process.ready and self.info is not None:
+            self.info.update(message.info)
+            return
         self.process.ready, self.driver, self.waiting = True, message.driver, ""
         self.restarts.succeeded()
         seconds = time.monotonic() - self.process.began

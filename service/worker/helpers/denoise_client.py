@@ -44,12 +44,24 @@ class DenoiseResult:
     missing: bool = False
 
 
+@dataclass(frozen=True)
+class Located:
+    """Where pictures are denoised beside a GPU, and why not there."""
+
+    place: str
+    detail: str = ""
+
+
 class DenoiseClient:
     """Denoises in a process that starts at the first request and ends when idle for a while."""
 
-    def __init__(self) -> None:
+    def __init__(self, gpu: int | None = None, located: Callable[[str], None] | None = None) -> None:
+        """`gpu`: EGL's number of the device that renders, where that is a GPU. Then `located` gets the place where
+        pictures are denoised, once that is known and where it changes."""
+        self._gpu, self._place, self._located = gpu, "", located
         self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why nothing is denoised
-        self._helper = HelperProcess("service.worker.helpers.denoise_main")
+        given = [] if gpu is None else ["--gpu", str(gpu)]
+        self._helper = HelperProcess("service.worker.helpers.denoise_main", *given)
         self._told: Callable[[DenoiseResult], None] | None = None
         self._deaths = 0
         self._asked_at = self._took_s = 0.0
@@ -89,6 +101,11 @@ class DenoiseClient:
             with contextlib.suppress(OSError):  # the first request says why
                 self._helper.start()
 
+    def locate(self) -> None:
+        """Begin to ask where pictures are denoised: beside a GPU only its process can say."""
+        if self._gpu is not None:
+            self.start()
+
     def ask(self, order: DenoiseRequest, told: Callable[[DenoiseResult], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
         self._told, self._asked_at = told, time.monotonic()
@@ -97,7 +114,7 @@ class DenoiseClient:
     def hear(self) -> None:
         """Pass on a denoised picture, if there is one."""
         try:
-            delivery: DenoiseResult = self._helper.hear()
+            delivery: DenoiseResult | Located = self._helper.hear()
         except BlockingIOError:
             return
         except channel.Closed:
@@ -107,6 +124,8 @@ class DenoiseClient:
             self._deaths += 1
             delivery = DenoiseResult(None, DIED, missing=self._deaths >= TRIES)
         else:
+            if isinstance(delivery, Located):
+                return self._take_place(delivery)
             self._deaths = 0
             self._took_s = time.monotonic() - self._asked_at
         if delivery.detail:
@@ -116,6 +135,15 @@ class DenoiseClient:
         told, self._told = self._told, None
         if told is not None:
             told(delivery)
+
+    def _take_place(self, news: Located) -> None:
+        if news.place == self._place:  # as before its process ended
+            return
+        self._place = news.place
+        if news.detail:
+            log.warning("the processor denoises beside a GPU", {"reason": news.detail})
+        if self._located is not None:
+            self._located(news.place)
 
     def sleep(self, other: socket.socket | None = None, timeout_s: float | None = None) -> None:
         """Sleep until there is an answer here, or a message on `other`."""

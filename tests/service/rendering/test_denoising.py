@@ -5,19 +5,27 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gpu import Renderer, denoise
 from service.cli import main
+from service.ipc import channel, heartbeat
+from service.ipc.messages import Ready
+from service.renderers.local.supervisor import Supervisor
 from service.worker.helpers.denoise_client import DIED, DenoiseClient, DenoiseResult, denoise_request
+from service.worker.loop import Loop
+from tests.service.rendering.fakes import FakeProcesses, with_fake_processes
 from tests.serving import PATIENCE_S, SCENE, Client, Server
 from tests.serving import client as opened
 
@@ -67,6 +75,43 @@ def test_a_render_is_denoised_and_its_noise_stays_the_raw_one(server: Server, ra
     assert np.array_equal(variance, raw[2]) and np.array_equal(color[..., 3], raw[1][..., 3])
     assert rmse(color, reference) < 0.5 * rmse(raw[1], reference)
     assert np.array_equal(finished(server, {**FEW, "denoise": True})[1], color)
+
+
+def test_info_says_where_pictures_are_denoised(server: Server) -> None:
+    told = server.http.get("/v1/info").json()["renderer"]["denoiser"]
+    assert re.fullmatch(r"Open Image Denoise \(pyoidn [\d.]+\) on the processor", told)
+
+
+def test_beside_a_gpu_its_process_is_asked(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the start, by EGL's number. The library has no part for this one, which is what info has from then on."""
+    monkeypatch.setitem(gpu.info, "software", False)
+    mine, its = channel.pair()
+    memory = heartbeat.memory()
+    loop = Loop(its, gpu, heartbeat.Heartbeat(memory), 1 << 30, None, 1.0, ahead="off")
+    os.close(memory)
+    said = list[Any]()
+
+    def listen() -> None:
+        while not (said and isinstance(said[-1], Ready)):
+            said.append(channel.receive(mine, wait=True))
+        mine.close()
+
+    with ThreadPoolExecutor(1) as ears, pytest.raises(channel.Closed):
+        ears.submit(listen)
+        loop.run()
+    loop._denoiser.close()
+    assert said[-1].info == {"denoiser": denoise.version(denoise.PROCESSOR)}
+
+
+def test_what_a_renderer_says_later_is_added_to_what_it_said() -> None:
+    processes = FakeProcesses()
+
+    async def test(supervisor: Supervisor) -> None:
+        before, driver = dict(await supervisor.ready(PATIENCE_S)), supervisor.driver
+        processes.now.say(Ready({"denoiser": "on CUDA"}))
+        assert supervisor.info == {**before, "denoiser": "on CUDA"} and supervisor.driver == driver
+
+    with_fake_processes(test, processes)
 
 
 def test_one_shot_is_denoised(server: Server, raw: Any, reference: Any) -> None:
