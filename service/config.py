@@ -169,7 +169,8 @@ class Config(BaseModel):
         None,
         ge=1,
         description="Most bytes of scenes and pictures on each device; the renderers of `llvmpipe:N` divide them "
-        "(default: 80 % of a GPU's, where its driver tells; `SUNBOX_MEMORY` for software renderers).",
+        "(default: 80 % of what a GPU has free at the start, where its driver tells; `SUNBOX_MEMORY` for software "
+        "renderers).",
     )
     ahead: Ahead = Field(
         "some",

@@ -68,6 +68,7 @@ def main() -> int:
 
 def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     from gpu import GpuError, Renderer, denoise, software_device
+    from gpu.analysis.device_limits import free_memory
     from service.worker.device.memory import UNLIMITED, default_limit
     from service.worker.loop import Loop
 
@@ -84,7 +85,7 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
         return 1
     # Not earlier: beside a dozen busy programs, starting at this priority took 30 s instead of 3 s.
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + arguments.nice)
-    limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
+    limit = arguments.memory or default_limit(renderer.info, free_memory(renderer.context), arguments.host_memory)
     # Beside a GPU the denoiser's own process knows: the loop says it later.
     place = denoise.PROCESSOR if renderer.info["software"] else ""
     told = {"denoiser": denoise.version(place), "memory_limit": None if limit == UNLIMITED else limit}

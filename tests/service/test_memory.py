@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from starlette.requests import Request
 
-from gpu import context
 from service.app import create_app
 from service.assets import AssetStore, ImageData
 from service.assets.cache import ParsedCache
@@ -32,7 +31,6 @@ from service.streams.edit_session import EditSession
 from service.system import memory
 from service.system.memory import Limit, MemoryBudget, machine_memory
 from service.system.turns import CALLER
-from service.worker.device.memory import UNLIMITED, default_limit
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, SCENE, Client, Server, served, wait_until
 
@@ -157,38 +155,6 @@ def test_a_container_s_limit_counts(
         (tmp_path / "groups" / name).write_text(text)
     assert machine_memory() == (limit or machine)
     assert MemoryBudget().limit == machine_memory() // 2
-
-
-def test_the_device_has_a_share() -> None:
-    assert default_limit({"software": True, "memory": None}, 1000) == 1000
-    assert default_limit({"software": True, "memory": None}, None) == MemoryBudget().limit
-    assert default_limit({"software": False, "memory": 1000}, 5) == 800
-    assert default_limit({"software": False, "memory": None}, 5) == UNLIMITED
-
-
-def test_a_gpu_s_memory_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Context:
-        info = dict.fromkeys(("GL_RENDERER", "GL_VERSION", "GL_VENDOR"), "a GPU")
-        extensions = frozenset({"GL_NVX_gpu_memory_info"})
-
-    class Library:
-        def __init__(self, name: str) -> None:
-            pass
-
-        def glGetIntegerv(self, name: int, value: Any) -> None:
-            assert name == context.DEDICATED_VIDEO_MEMORY
-            value._obj.value = kibibytes
-
-    kibibytes = 4096
-    monkeypatch.setattr("ctypes.CDLL", Library)
-    assert context.describe(Context())["memory"] == 4 * MIB
-    kibibytes = -8
-    assert context.describe(Context())["memory"] is None
-    kibibytes = 4096
-    monkeypatch.setitem(Context.info, "GL_RENDERER", "llvmpipe (LLVM 15.0.6, 256 bits)")
-    assert context.describe(Context())["memory"] is None, "it lists the extension, and answers with anything"
-    monkeypatch.setattr(Context, "extensions", frozenset())
-    assert context.describe(Context())["memory"] is None
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from gpu import OutOfMemory
 from service.system.memory import MemoryBudget
 
-GPU_SHARE = 0.8  # of a GPU's memory: drivers, desktops and other programs need some
+GPU_SHARE = 0.8  # of a GPU's free memory: compilers, the denoiser, drivers and desktops need some more
 UNLIMITED = 1 << 62
 
 log = logging.getLogger(__name__)
@@ -63,15 +63,17 @@ class Memory:
         return True
 
 
-def default_limit(info: Mapping[str, Any], host_memory: int | None) -> int:
-    """Bytes, by what `gpu.Renderer.info` says.
+def default_limit(info: Mapping[str, Any], free: int | None, host_memory: int | None) -> int:
+    """Bytes, by what `gpu.Renderer.info` says and the bytes that the device has `free` as the renderer starts.
 
     Where the device's memory is the machine's, the kernel would kill somebody; there it is `host_memory`, by default
-    half of the machine's. A GPU's driver says no by itself; what it is not asked for is left to other programs.
+    half of the machine's. On a GPU it is 80 % of what others leave free, of the whole memory where the driver says
+    no more than that, and there is no limit where it says neither: then its refusals are the limit.
     """
     if info["software"]:
         return host_memory or MemoryBudget().limit
-    return int(GPU_SHARE * info["memory"]) if info["memory"] else UNLIMITED
+    known = free or info["memory"]
+    return int(GPU_SHARE * known) if known else UNLIMITED
 
 
 def _mib(size: int) -> int:
