@@ -205,7 +205,7 @@ class AppState:
 
 
 def _told(member: Member) -> dict[str, str | None]:
-    return {**asdict(member.place), "driver": member.driver, "state": member.state}
+    return {**asdict(member.place), "vendor": member.vendor, "driver": member.driver, "state": member.state}
 
 
 def app_state(connection: HTTPConnection) -> AppState:

@@ -1,4 +1,5 @@
-"""`sunbox info [SCENE.json] [--measure]`: what a scene contains and needs, and what would render it here."""
+"""`sunbox info [SCENE.json] [--measure]`: what a scene contains and needs, what would render it here, and EGL's
+devices."""
 
 from __future__ import annotations
 
@@ -34,6 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         _print([("scene", str(source.path)), *contents(source.scene, packed)])
     from gpu import GpuError
     from service.worker.in_process import InProcessRenderer
+    from service.worker.list_devices import names
 
     try:
         with InProcessRenderer(config.device) as renderer:
@@ -43,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
                 _print(measured(renderer, packed))
             rows = [("sunbox", metadata.version("sunbox-server"))]
             rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
+        rows += [(f"device {number}", name) for number, name in enumerate(names())]
     except GpuError as error:
         raise Failed(str(error)) from None
     _print([*rows, ("most pixels", f"{config.max_pixels:,}"), ("most triangles", f"{config.max_triangles:,}")])

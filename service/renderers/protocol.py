@@ -40,6 +40,7 @@ class Member:
 
     place: Place
     state: State
+    vendor: str | None  # of the device, as its driver says it; None: not known yet
     driver: str | None  # and its version; two renderers with equal ones give equal bits. None: not known yet
     process_id: int | None  # on its host; None while there is none
     statistics: Statistics

@@ -76,7 +76,8 @@ class NamedPreset(Named):
 
 class RendererPlace(BaseModel):
     id: str
-    driver: str | None = Field(description="Null until it has started.")
+    vendor: str | None = Field(description="As the device's driver says it; null while nothing renders there.")
+    driver: str | None = Field(description="Its renderer and version; null until it has started.")
     device: str
     host: str
     state: str

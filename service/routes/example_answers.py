@@ -56,7 +56,7 @@ WAITING |= {"eta_s": None, "forecast": None, "renderers": 0}
 INFO: dict[str, Any] = {
     "version": "0.1.0",
     "renderer": {"renderer": "llvmpipe (LLVM 19.1.7, 256 bits)", "vendor": "Mesa", "software": True},
-    "renderers": [{"id": "0", "device": "0", "host": "studio", "driver": DRIVER, "state": "ready"}],
+    "renderers": [{"id": "0", "device": "0", "host": "studio", "vendor": "Mesa", "driver": DRIVER, "state": "ready"}],
     "sandbox": {"no_new_privileges": True, "no_network": True, "seccomp": True},
     "memory": {"limit": 12638257152, "used": {"scenes": 21545840, "pictures": 267386880}},
     "limits": {"max_pixels": 16777216, "max_body": 268435456},

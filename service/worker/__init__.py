@@ -3,7 +3,7 @@
 `python -m service.worker DESCRIPTOR` with one end of `channel.pair()`.
 
 __main__      the process: its options, its device, its end
-list_devices  a program that prints EGL's devices
+list_devices  EGL's devices by name, and as a program that prints them
 loop          takes the newest messages, chooses whose turn it is, traces a slice, publishes
 scheduler     whose turn it is
 task          one client's task: whether it wants a turn

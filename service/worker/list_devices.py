@@ -6,7 +6,7 @@ import json
 import sys
 from dataclasses import asdict
 
-from gpu import GpuError, devices
+from gpu import ContextError, GpuError, Renderer, devices
 
 
 def main() -> int:
@@ -16,6 +16,22 @@ def main() -> int:
         found = {"error": str(error)}
     json.dump(found, sys.stdout)
     return 0
+
+
+def names() -> list[str]:
+    """For each of EGL's devices its vendor and its renderer, as OpenGL says them, and its place on the PCI bus. Makes
+    a context on each, which wakes GPUs up. Raises ContextError where EGL lists none."""
+    named = []
+    for number, device in enumerate(devices()):
+        try:
+            renderer = Renderer(number)
+        except ContextError:
+            named.append(f"{device.name}, which cannot render")
+            continue
+        info = renderer.info
+        renderer.close()
+        named.append(", ".join(filter(None, (info["vendor"], info["renderer"], device.pci))))
+    return named
 
 
 if __name__ == "__main__":

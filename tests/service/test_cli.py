@@ -298,7 +298,10 @@ def test_info_names_the_renderer_and_the_scene(
     said = capsys.readouterr()
     assert "1 sphere" in said.out and "is saved" in said.out and "compiling" in said.err
     assert main(["info"]) == 0
-    assert "renderer" in capsys.readouterr().out
+    rows = dict(line.split("  ", 1) for line in capsys.readouterr().out.splitlines())
+    named = f"{gpu.info['vendor']}, {gpu.info['renderer']}"
+    assert rows["renderer"].strip() == gpu.info["renderer"]
+    assert named in [name.strip() for row, name in rows.items() if row.startswith("device ")]
 
 
 def test_choices_are_those_of_the_renderer() -> None:

@@ -89,7 +89,8 @@ class Supervisor:
     def members(self) -> list[Member]:
         known = self.info or {}  # a node of a cluster says where it is
         place = replace(self.place, host=known["host"]) if "host" in known else self.place
-        return [Member(place, self._keeper.state, self.driver, self.process_id, self.statistics)]
+        vendor = known.get("vendor")
+        return [Member(place, self._keeper.state, vendor, self.driver, self.process_id, self.statistics)]
 
     @property
     def tasks(self) -> Mapping[int, Task]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from gpu import Renderer, devices, software_device
+from gpu import ContextError, Renderer, devices, egl, software_device
 from service import config as configs
 from service import launch
 from service.config import Config, ConfigError, load_config
@@ -23,6 +23,7 @@ from service.renderers.local.process import THREADS, Options
 from service.renderers.pool import devices as seating
 from service.renderers.pool.devices import NoDevices, missing_device, of_cuda, seats
 from service.system.child_processes import inherited_environment
+from service.worker import list_devices
 from service.worker.helpers import compile_main
 from tests.serving import Server
 
@@ -135,6 +136,23 @@ def test_egl_lists_its_devices(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, t
     assert "could not be listed" in (missing_device(load_config(devices="0")) or "")
 
 
+def test_devices_are_named_as_opengl_names_them(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And one without OpenGL as EGL and Linux do."""
+    software = software_device()
+
+    def some(device: int) -> Renderer:
+        if device == 1:
+            raise ContextError("MIG")
+        return Renderer(software)
+
+    cards = [egl.Device("AMD", False, pci="0000:0a:00.0"), egl.Device("NVIDIA, /dev/dri/card0", False)]
+    monkeypatch.setattr(list_devices, "devices", lambda: cards)
+    monkeypatch.setattr(list_devices, "Renderer", some)
+    first, second = list_devices.names()
+    assert first == f"{gpu.info['vendor']}, {gpu.info['renderer']}, 0000:0a:00.0"
+    assert second == "NVIDIA, /dev/dri/card0, which cannot render"
+
+
 def test_threads_of_a_renderer_and_its_helpers() -> None:
     given = process._environment(Options(cores=3))
     assert {given[name] for name in THREADS} == {"3"} and given["PATH"]
@@ -153,6 +171,7 @@ def test_a_server_with_two(two: Server) -> None:
     assert found["renderer"]["memory_limit"] == found["memory"]["limit"] // 2
     driver = f"{found['renderer']['renderer']} {found['renderer']['version']}"
     assert {each["driver"] for each in found["renderers"]} == {driver}
+    assert {each["vendor"] for each in found["renderers"]} == {found["renderer"]["vendor"]}
     metrics = two.http.get("/metrics").text
     for renderer in "01":
         assert f'sunbox_renderer_resident_bytes{{renderer="{renderer}"}} ' in metrics
