@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -211,3 +212,10 @@ def test_the_process_is_told_its_gpu_and_says_where_it_works(caplog: pytest.LogC
     assert heard == [denoise.PROCESSOR]
     (record,) = caplog.records
     assert "the processor denoises" in record.getMessage()
+
+
+@pytest.mark.parametrize("part", ["cuda", "hip", "sycl"])
+def test_the_package_has_the_library_s_parts_for_gpus(part: str) -> None:
+    """Which the image has with it; another build of pyoidn may come without."""
+    folder = Path(pyoidn.__file__).parent / "oidn" / "lib"
+    assert list(folder.glob(f"libOpenImageDenoise_device_{part}.so.*"))
