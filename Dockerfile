@@ -63,6 +63,6 @@ ARG WARM=
 RUN if [ -n "$WARM" ]; then sunbox warm; fi
 VOLUME /data
 EXPOSE 8000
-HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-m", "service.commands.health"]
+HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-m", "service.cli.health"]
 ENTRYPOINT ["sunbox"]
 CMD ["serve"]

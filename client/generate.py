@@ -134,6 +134,6 @@ def _literal(value: Any) -> str:
 
 
 if __name__ == "__main__":
-    from service.scene.schema import schema
+    from service.document.schema import schema
 
     TARGET.write_text(module(schema()))

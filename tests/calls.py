@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from service.state import AppState
+from service.server.state import AppState
 from tests.serving import SCENE, SMALL, Server
 
 

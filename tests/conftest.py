@@ -17,8 +17,8 @@ import pytest
 
 from gpu import ContextError, Renderer
 from gpu import context as contexts
-from service.logs import setup
-from service.logs.formatters import Console
+from service.system.logs import setup
+from service.system.logs.formatters import Console
 from tests import kernel_count
 from tests.families import FamilyRenderer
 from tests.privileges import shed

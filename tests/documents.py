@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from service.assets import ImageData, MeshData
+from service.document import parse_scene
+from service.formats import ImageData, MeshData
 from service.pack import Packed, pack
 from service.problems import AssetError, InvalidDocument
-from service.scene import parse_scene
 
 CAMERA = {"position": [0, 1, 5], "target": [0, 0, 0]}
 GREY = {"type": "diffuse", "albedo": 0.5}

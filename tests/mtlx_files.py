@@ -5,9 +5,9 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from service.assets import AssetStore
-from service.assets.scene_import import Imported
-from service.scene.saved_material import check_saved_material
+from service.document.saved_material import check_saved_material
+from service.formats.scene_import import Imported
+from service.server.assets import AssetStore
 from tests.obj_files import zipped
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39"{0}>\n'

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from service.assets.sandbox import sandbox
+from service.formats.sandbox import sandbox
 from service.system.child_processes import Child
 
 

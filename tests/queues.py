@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from service.renders.queue import QueueLimits
-from service.renders.retention import Retention
+from service.server.renders.queue import QueueLimits
+from service.server.renders.retention import Retention
 
 LIMITS = QueueLimits(
     running=8,

@@ -9,9 +9,9 @@ import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings
 from gpu.settings import ESTIMATORS
-from service.assets import ImageData
+from service.document import parse_scene
+from service.formats import ImageData
 from service.pack import pack
-from service.scene import parse_scene
 from tests.families import EXACT
 
 

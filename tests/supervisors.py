@@ -10,11 +10,11 @@ from typing import Any, Protocol
 
 from gpu import RenderSettings
 from service.config import NICENESS
+from service.document import parse_scene
 from service.ipc.messages import FromRenderer, StopRule, View
 from service.pack import pack
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import AHEAD, PATIENCE_S, SCENE
 

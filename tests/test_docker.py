@@ -9,9 +9,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service import app
-from service.commands import health
+from service.cli import health
 from service.config import Config
+from service.server import app
 from tests.serving import Server
 
 ROOT = Path(__file__).parents[1]

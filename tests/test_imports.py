@@ -34,36 +34,20 @@ LARGE_CLASSES = {
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems", "service.callback_hosts", "service.containers", "service.quantities"},
-    {"service.config"},
-    {"service.views", "service.displays", "service.colorimetry"},
+    {
+        "service.problems", "service.callback_hosts", "service.containers", "service.quantities", "service.config",
+        "service.views", "service.displays", "service.colorimetry",
+    },
     {"service.system"},
-    {"service.logs", "service.ipc"},
-    {"service.scene"},
-    {"service.quality", "service.presets"},
-    {"service.images"},
-    {"service.assets"},
-    {"service.storage"},
-    {"service.pack", "service.exports"},
-    {"service.file_formats"},
-    {"service.requests"},
-    {"service.renderers"},
-    {"service.renders"},
-    {"service.batches"},
-    {"service.callbacks"},
-    {"service.verdict"},
-    {"service.streams"},
-    {"service.worker"},
-    {"service.http"},
-    {"service.operation"},
-    {"service.state"},
-    {"service.routes"},
-    {"service.app"},
-    {"service.launch"},
+    {"service.ipc"},
+    {"service.document"},
+    {"service.formats"},
+    {"service.pack"},
+    {"service.exports", "service.renderers", "service.worker"},
+    {"service.server"},
     {"service.bench"},
-    {"service.commands"},
     {"service.cli"},
-]
+]  # fmt: skip
 GPU_LAYERS = [
     {"gpu.layout", "gpu.egl", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.oidn", "gpu.denoise"},
     {"gpu.tables", "gpu.accel"},
@@ -80,7 +64,7 @@ RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analy
 LOOKS_INTO_GPU = {
     "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables", "gpu.jit"),
     "service.worker": (*RUNS_KERNELS, "gpu.oidn"),
-    "service.commands": ("gpu", "gpu.errors", "gpu.denoise"),
+    "service.cli": ("gpu", "gpu.errors", "gpu.denoise"),
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
 WITHOUT_GL = (
@@ -102,7 +86,7 @@ GL_SIDE = (
 TOUCHES_GL = ("service.worker", "service.bench")
 OFFLINE = "gpu.tables.build"
 SHARED_BY_PROCESSES = (
-    "service.ipc", "service.system", "service.logs", "service.quality", "service.views", "service.displays"
+    "service.ipc", "service.system", "service.document.quality", "service.views", "service.displays"
 )  # fmt: skip
 ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic"}
@@ -139,7 +123,7 @@ def _imports(path: Path) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
-            # `from service import images` names service.images; `from gpu.errors import GpuError` gpu.errors.GpuError
+            # `from service import views` names service.views; `from gpu.errors import GpuError` gpu.errors.GpuError
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
@@ -250,8 +234,7 @@ def test_only_the_renderers_process_and_the_benchmarks_touch_gl() -> None:
 
 def test_the_renderers_process_shares_only_its_channel() -> None:
     """The server imports nothing of the renderer's process, and that process nothing of the server but SHARED."""
-    worker, rooms = "service.worker", "requests renders renderers streams routes state app launch storage"
-    server = [f"service.{room}" for room in rooms.split()]
+    worker, server = "service.worker", ("service.renderers", "service.server")
     for module, imported in graph().items():
         for other in imported:
             said = f"{module} imports {other}"
@@ -369,7 +352,7 @@ def test_modules_of_the_editor_keep_to_their_rooms() -> None:
 
 def test_neither_the_editor_nor_a_route_knows_a_material_model() -> None:
     """They ask the schema and the server's functions, so that a new model needs no line there."""
-    routes = (path for path in ROOT.glob("service/routes/*.py") if path.stem != "examples")
+    routes = (path for path in ROOT.glob("service/server/routes/*.py") if path.stem != "examples")
     for path in (*ROOT.glob("web/**/*.js"), *ROOT.glob("web/*.html"), *routes):
         for name in NUMBERS:
             assert not re.search(rf"""["']{name}["']|\b{name}:""", path.read_text()), f"{path.name} knows {name}"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-LAST = "from service.scene.material.surface import AnySurface\n"
+LAST = "from service.document.material.surface import AnySurface\n"
 FIRST = '    Model("diffuse", 0, (Lobe.DIFFUSE,)),\n'
 ROW = '    Model("matte", 7, (Lobe.DIFFUSE,)),\n'
 CLASS = '''"""`matte`: `diffuse` by another name."""
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from service.scene.material.diffuse import DiffuseMaterial
+from service.document.material.diffuse import DiffuseMaterial
 
 
 class MatteMaterial(DiffuseMaterial):
@@ -33,8 +33,8 @@ import numpy as np
 from gpu import Renderer, RenderSettings
 from service.config import Config
 from service.pack import pack
-from service.requests.conversion_request import parse_conversion
-from service.scene import parse_scene
+from service.server.requests.conversion_request import parse_conversion
+from service.document import parse_scene
 
 def scene(model):
     ask = {"material": {"type": "diffuse", "albedo": [0.8, 0.5, 0.1]}, "to": model}
@@ -72,10 +72,10 @@ def test_a_model_more_is_a_row_a_shader_and_a_class(tmp_path: Path) -> None:
     models = tmp_path / "shaders/bsdf/models"
     text = (models / "diffuse.glsl").read_text().replace("diffuse_", "matte_")
     (models / "matte.glsl").write_text(text.replace("\n\n", "\n\n#if HAS_MATTE\n", 1) + "#endif\n")
-    union = tmp_path / "service/scene/material/__init__.py"
+    union = tmp_path / "service/document/material/__init__.py"
     (union.parent / "matte.py").write_text(CLASS)
     given = union.read_text().replace("    | MicrofacetMaterial,", "    | MicrofacetMaterial\n    | MatteMaterial,")
-    union.write_text(given.replace(LAST, LAST + "from service.scene.material.matte import MatteMaterial\n"))
+    union.write_text(given.replace(LAST, LAST + "from service.document.material.matte import MatteMaterial\n"))
     subprocess.run([sys.executable, "-c", RENDER], cwd=tmp_path, check=True, timeout=600)
     known, new = (np.load(tmp_path / f"{model}.npy") for model in ("diffuse", "matte"))
     assert known.max() > 0.1

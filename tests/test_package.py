@@ -49,10 +49,10 @@ def test_wheel_holds_nothing_else(site: Path) -> None:
 def test_editor_is_found(site: Path) -> None:
     program = """
 from fastapi.testclient import TestClient
-import service.app, sys
+import service.server.app, sys
 from service.config import Config
-client = TestClient(service.app.create_app(Config()), base_url="http://127.0.0.1")
-sys.stdout.write(service.app.__file__ + "\\n" + client.get("/").text)
+client = TestClient(service.server.app.create_app(Config()), base_url="http://127.0.0.1")
+sys.stdout.write(service.server.app.__file__ + "\\n" + client.get("/").text)
 """
     answer = run_from(site, "-c", program)
     assert answer.returncode == 0, answer.stderr

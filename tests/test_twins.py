@@ -12,9 +12,9 @@ from gpu import RenderSettings, footprint, layout
 from gpu.layout import ShapeKind
 from gpu.picture import display
 from service import colorimetry, pack
-from service.assets.gltf import json_view
+from service.document import numbers
+from service.formats.read.gltf import json_view
 from service.pack.lights import light_bounds
-from service.scene import numbers
 from tests.documents import packed
 
 ROOT = Path(__file__).parent.parent
@@ -41,7 +41,7 @@ def test_the_renderer_encodes_srgb_as_the_service() -> None:
 
 
 def test_gltf_files_have_the_ranges_of_scenes() -> None:
-    """Parsers of files do not load service.scene: that takes a quarter of a second."""
+    """Parsers of files do not load service.document: that takes a quarter of a second."""
     assert (json_view.LARGEST, json_view.BRIGHTEST) == (numbers.LARGEST, numbers.BRIGHTEST)
 
 

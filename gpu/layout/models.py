@@ -1,6 +1,6 @@
 """The material models: one row each, from which the shaders' dispatchers, flags and lists of models follow.
 
-A model is a row here, its functions in `shaders/bsdf/models/NAME.glsl`, and a class in `service/scene/material`;
+A model is a row here, its functions in `shaders/bsdf/models/NAME.glsl`, and a class in `service/document/material`;
 `gpu/kernels/models_glsl.py` says which functions the shaders call. All other code asks what a model can do, and never
 for its name.
 """

@@ -12,11 +12,11 @@ import trimesh
 from gpu import Renderer, RenderSettings
 from gpu.accel import bvh
 from gpu.layout import ShapeKind
-from service.assets import MeshData
 from service.bench import timing
 from service.bench.scenes import BenchAssets, mesh_on_plane, standing
+from service.document import parse_scene
+from service.formats import MeshData
 from service.pack import pack
-from service.scene import parse_scene
 
 LEVELS = range(3, 9)  # 1 280, 5 120, ... 1 310 720 triangles
 BOUNCES, RUNS = 4, 3

@@ -21,8 +21,8 @@ from urllib.request import urlopen
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from service import presets
 from service.bench import machine
+from service.document import presets
 
 SCENE = "sphere-on-floor"  # the editor's default
 SIZE = 512

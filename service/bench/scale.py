@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from gpu import Renderer
-from service import presets
 from service.bench import machine, scale_costs, scale_model
 from service.bench.server import Server
+from service.document import presets
 from service.worker.division.ledger import MOST_BYTES
 
 PLACES = (  # what runs, renderers, cores

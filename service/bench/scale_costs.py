@@ -14,11 +14,10 @@ import numpy as np
 
 from gpu import Band, Renderer, RenderSettings, border_after
 from gpu.analysis.metering import noise_meter_off
-from service import presets
 from service.bench.scale_model import Costs
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.pack import pack
-from service.scene import parse_scene
 from service.worker.division.ledger import MOST_BYTES
 
 if TYPE_CHECKING:

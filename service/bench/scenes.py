@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
-from service.assets import Assets, AssetStore, FileAssets, ImageData, MeasuredData, MeshData
 from service.config import load_config
+from service.document import presets
+from service.formats import Assets, ImageData, MeasuredData, MeshData
+from service.server.assets import AssetStore, FileAssets
 
 Document = dict[str, Any]
 MESH = "mesh"  # the asset that stands for the measured mesh

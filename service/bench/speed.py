@@ -16,8 +16,8 @@ from typing import Any
 from gpu import Renderer, RenderSettings
 from service.bench import growth, latency, machine, timing
 from service.bench.scenes import BenchAssets, Case, cases
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 
 SIZE = timing.SIZE
 

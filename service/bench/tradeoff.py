@@ -21,9 +21,9 @@ from gpu.analysis.metering import noise_meter_off
 from service.bench import machine, pareto
 from service.bench.tradeoff_scenes import Case, TradeoffAssets, cases
 from service.colorimetry import LUMINANCE
+from service.document import parse_scene
+from service.document.quality import PRESETS
 from service.pack import pack
-from service.quality import PRESETS
-from service.scene import parse_scene
 
 FULL = 512  # pixels a side of the pictures whose seconds are reported
 EQUAL_SAMPLES = 64  # of the plain render: errors at equal time are at the time that it takes

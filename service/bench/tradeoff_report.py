@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from service.quality import PRESETS, PRICES_FILE, short, text
+from service.document.quality import PRESETS, PRICES_FILE, short, text
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
-from service.assets import ImageData
 from service.bench.scenes import MESH, STUDIO, BenchAssets
+from service.document import presets
+from service.formats import ImageData
 
 Document = dict[str, Any]
 PLANKS, BUMPS = "planks", "bumps"  # textures, made below

@@ -8,9 +8,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import PurePath
 
+from service.document import Scene
 from service.exports.writing import Exported, Files, Limits
 from service.problems import FieldError, InvalidDocument, NotProvided
-from service.scene import Scene
 
 Writer = Callable[[Scene, Files, Limits], Exported]
 

@@ -6,8 +6,7 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-from service.exports.losses import Losses
-from service.scene.material import (
+from service.document.material import (
     BlinnPhongMaterial,
     DiffuseMaterial,
     Material,
@@ -15,8 +14,9 @@ from service.scene.material import (
     PhongMaterial,
     PrincipledMaterial,
 )
-from service.scene.material.conversion import converted
-from service.scene.texture import ScalarTexture
+from service.document.material.conversion import converted
+from service.document.texture import ScalarTexture
+from service.exports.losses import Losses
 
 MATTE = {"roughness": 1.0, "specular": 0.0}
 MOST_SPECULAR = 0.08  # reflectance head-on that `specular` 1 stands for

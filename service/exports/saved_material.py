@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from service.document import Scene, load_json, parse_scene
 from service.problems import escaped
-from service.scene import Scene, load_json, parse_scene
 
 NOWHERE = {"position": [0, 0, 1], "target": [0, 0, 0]}
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from service.assets import Assets
 from service.exports.losses import Losses
+from service.formats import Assets
 from service.problems import TooLarge
 
 

@@ -11,12 +11,12 @@ import numpy as np
 from gpu import layout
 from gpu.layout.measured_records import COLUMNS_BITS, LIMIT_ANGLES, Measured, MeasuredKind
 from gpu.layout.models import NUMBERS
-from service.assets import Assets, MeasuredData
-from service.assets.measured.warp import Warp
+from service.document import Scene
+from service.document.material import MeasuredMaterial
+from service.formats import Assets, MeasuredData
+from service.formats.read.measured.warp import Warp
 from service.pack.edits.cache import PackCache, lasting
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
-from service.scene import Scene
-from service.scene.material import MeasuredMaterial
 
 MAX_TEXELS = 2**27  # of a texture of 16384 rows on the device
 GROUPS = Measured.words // 4

@@ -8,9 +8,9 @@ import numpy as np
 
 from gpu.layout.microfacet_records import TERMS, Distribution, Microfacet
 from gpu.tables import microfacet as tables
-from service.scene import Scene
-from service.scene.material.microfacet import MicrofacetMaterial
-from service.scene.texture import ScalarTexture
+from service.document import Scene
+from service.document.material.microfacet import MicrofacetMaterial
+from service.document.texture import ScalarTexture
 
 
 def pack_microfacets(scene: Scene) -> np.ndarray:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from gpu import SceneArrays, SceneEdit
+from service.document import Scene
 from service.pack.measured import keep_measured
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textures.words import repacked
 from service.pack.worn import places, worn
-from service.scene import Scene
 
 
 def parameter_edit(

@@ -8,13 +8,13 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import CameraKind, models
-from service.scene import Scene
-from service.scene.camera import AnyCamera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
-from service.scene.environment import Environment, SkyEnvironment
-from service.scene.material import Material
-from service.scene.material.surface import SolidSurface
-from service.scene.numbers import Vec3
-from service.scene.texture import ColorTexture, ScalarTexture
+from service.document import Scene
+from service.document.camera import AnyCamera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
+from service.document.environment import Environment, SkyEnvironment
+from service.document.material import Material
+from service.document.material.surface import SolidSurface
+from service.document.numbers import Vec3
+from service.document.texture import ColorTexture, ScalarTexture
 
 # The renderer's names of a material's parameters, where they differ from the document's.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}

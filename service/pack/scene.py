@@ -11,7 +11,11 @@ import numpy as np
 
 from gpu import EnvironmentArrays, SceneArrays, scene_bytes
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
-from service.assets import Assets, ImageData, MeasuredData, MeshData
+from service.document import Material, PerspectiveCamera, Scene
+from service.document.environment import Environment
+from service.document.numbers import BRIGHTEST
+from service.document.shape import MeshShape
+from service.formats import Assets, ImageData, MeasuredData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import assemble
 from service.pack.geometry.bodies import bodies, odd_media
@@ -33,10 +37,6 @@ from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
 from service.pack.worn import places, worn
 from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene import Material, PerspectiveCamera, Scene
-from service.scene.environment import Environment
-from service.scene.numbers import BRIGHTEST
-from service.scene.shape import MeshShape
 
 _NOWHERE = PerspectiveCamera(position=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0))
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind, texture_records
+from service.document.texture import CheckerTexture, ImageTexture, is_projected
 from service.pack.geometry.geometry import Geometry
 from service.pack.textures.images import PackedTexels
 from service.pack.textures.recipes import listed
 from service.pack.textures.uses import TextureReference
 from service.pack.textures.words import record_of, values_of
-from service.scene.texture import CheckerTexture, ImageTexture, is_projected
 
 # Barycentric places at which a triangle's emission is evaluated: the middles of the 16 quarters of its quarters.
 _EDGE = np.arange(4)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from service.scene import Scene
-from service.scene.material import Material
-from service.scene.procedural import RampInput, RampTexture
-from service.scene.texture import references
+from service.document import Scene
+from service.document.material import Material
+from service.document.procedural import RampInput, RampTexture
+from service.document.texture import references
 
 
 def worn(scene: Scene) -> Scene:

@@ -9,6 +9,5 @@ replay_log      the messages of one task, so that another renderer can go on wit
 working_states  which states of a task a renderer may go back to
 statistics      counters and distributions, for /metrics
 ask             one question to them and its one answer
-first_frame     the first frame of a scene that no client asked for: for readiness, and to warm up
 bsdf_questions  questions about the BSDF of one material
 """

@@ -14,5 +14,6 @@ background       tasks that nobody awaits, none of which dies unseen
 waiting          waits for an event, for a time
 power            whether there is power to spare for work that nobody asked for
 executors        the threads of the server's slow work
+logs             a line or a JSON object for each event
 priority         niceness of threads and processes
 """

@@ -14,10 +14,10 @@ from pathlib import Path
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
 from service.ipc.messages import Ready, Unable
-from service.logs import setup
 from service.system.confined import hide
 from service.system.garbage import loaded
 from service.system.lifeline import end_with
+from service.system.logs import setup
 from service.system.priority import raise_process_niceness
 from service.system.shared_memory import return_freed
 

@@ -15,7 +15,7 @@ from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.task import Task
 
 if TYPE_CHECKING:
-    from service.quality import ResolvedSettings
+    from service.document.quality import ResolvedSettings
 
 NUMBER = 1  # of the only task
 SIGNAL_S = 0.1  # how long a signal may go unnoticed while the denoiser works

@@ -11,12 +11,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from service import presets
-from service.cli import exit_code
-from service.commands import BadInput, Failed
-from service.commands.bench import need_matplotlib, output_path, progress, refuse_quick_publishing, write_figures
-from service.commands.configuration import configuration
-from service.commands.documents import read_source, source_assets
+from service.cli import BadInput, Failed
+from service.cli.bench import need_matplotlib, output_path, progress, refuse_quick_publishing, write_figures
+from service.cli.configuration import configuration
+from service.cli.documents import read_source, source_assets
+from service.cli.program import exit_code
+from service.document import presets
 from tests.bench import gallery, soak, soak_restarts
 
 

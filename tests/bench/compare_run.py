@@ -15,8 +15,8 @@ import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 
 
 def main() -> None:

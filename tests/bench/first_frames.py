@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
-from service import presets
 from service.bench import latency
+from service.document import presets
 from tests.bench import thumbnails
 from tests.bench.sliders import sliders
 

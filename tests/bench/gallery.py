@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service import presets
+from service.document import presets
 from tests.bench import thumbnail_shapes as shapes
 from tests.bench import thumbnail_stages as stages
 

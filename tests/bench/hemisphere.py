@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from gpu import Renderer, RenderSettings
-from service import presets
 from service.bench import machine, timing
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.pack import pack
-from service.scene import parse_scene
 
 SIZE = 96
 MATERIALS = {

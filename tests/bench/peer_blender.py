@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from service.bench.scenes import BenchAssets
-from service.scene.transform import Transform
+from service.document.transform import Transform
 from tests.bench.peer_scenes import Document, PeerCase
 
 # Ours to theirs. The middle of an image of the sky is our -Z and their +X, its right half our +X and their -Y: so

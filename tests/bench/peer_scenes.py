@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
 from service.bench.scenes import MESH, SOFT_SUN, STUDIO, BenchAssets
-from service.scene.transform import Transform
+from service.document import presets
+from service.document.transform import Transform
 
 Document = dict[str, Any]
 

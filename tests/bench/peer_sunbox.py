@@ -10,8 +10,8 @@ import numpy as np
 
 from gpu import Renderer, RenderSettings
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench import peer_scenes
 
 MANY = 1 << 24

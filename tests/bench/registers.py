@@ -18,10 +18,9 @@ from typing import Any
 from gpu import RenderSettings
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
-from service import presets
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench import radv
 
 ENTRY = "pathtrace.comp"

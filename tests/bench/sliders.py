@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.scene.schema import schema
+from service.document.schema import schema
 
 Json = dict[str, Any]
 

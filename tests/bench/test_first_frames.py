@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from service import presets
-from service.scene import merge_patch, parse_scene
+from service.document import merge_patch, parse_scene, presets
 from tests.bench import first_frames
 from tests.bench.__main__ import main
 from tests.bench.sliders import Slider, sliders

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from service.bench.scenes import SOFT_SUN
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench import peer_blender, peer_scenes, peers
 from tests.bench.__main__ import main
 

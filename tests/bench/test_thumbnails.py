@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import presets
-from service.presets import physically_based
+from service.document import presets
+from service.document.presets import physically_based
 from tests.bench import thumbnail_shapes as shapes
 from tests.bench import thumbnail_stages as stages
 from tests.bench import thumbnails

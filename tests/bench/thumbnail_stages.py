@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
+from service.document import presets
 from tests.bench import thumbnail_shapes as shapes
 
 Document = dict[str, Any]

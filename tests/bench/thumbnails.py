@@ -16,9 +16,9 @@ from urllib.request import Request, urlopen
 
 from PIL import Image
 
-from service import presets
 from service.bench import machine
 from service.bench.latency import server
+from service.document import presets
 from tests.bench import thumbnail_stages as stages
 
 FOLDER = Path(__file__).resolve().parents[2] / "web" / "thumbnails"

@@ -21,8 +21,8 @@ import httpx
 import numpy as np
 from PIL import Image
 
-from service import presets
 from service.bench.latency import server
+from service.document import presets
 from tests.serving import Client, Picture
 
 STEP_S = 0.2

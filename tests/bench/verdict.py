@@ -10,17 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
-from service.commands.tracing import Interrupt, Tracing
+from service.cli.tracing import Interrupt, Tracing
+from service.document import parse_scene, parse_settings, presets
+from service.document.quality import ResolvedSettings, resolve
 from service.ipc.messages import View
 from service.pack import Packed, pack
-from service.quality import ResolvedSettings, resolve
-from service.routes.examples import SCENE
-from service.scene import parse_scene, parse_settings
-from service.verdict.comparison import ways_of
-from service.verdict.decision import decide
-from service.verdict.evidence import Estimate, Evidence
-from service.verdict.schedule import of_two_documents, seeds_from
+from service.server.routes.examples import SCENE
+from service.server.verdict.comparison import ways_of
+from service.server.verdict.decision import decide
+from service.server.verdict.evidence import Estimate, Evidence
+from service.server.verdict.schedule import of_two_documents, seeds_from
 from service.worker.in_process import InProcessRenderer
 from tests.rendering import Images
 

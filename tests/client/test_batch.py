@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import sunbox
-from service.cli import main
+from service.cli.program import main
 from tests.serving import ENDLESS, SCENE, SMALL, Server, wait_until
 
 OVER = {"/materials/ball/roughness": [0.1, 0.9]}

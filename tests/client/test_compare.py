@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 import sunbox
-from service.cli import main
+from service.cli.program import main
 from tests.serving import SCENE, Server
 
 SETTINGS = {"width": 32, "height": 24, "max_samples": 32}

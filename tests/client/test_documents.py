@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 import pytest
 
-from service.scene.schema import schema
+from service.document.schema import schema
 from sunbox import document
 
 CLIENT = Path(__file__).parents[2] / "client"

@@ -59,7 +59,7 @@ def test_bits_are_those_of_the_command_line(folder: Path) -> None:
         "/tone_map",
     ]
     options = [option for name, value in SMALL.items() for option in ("--set", f"{name}={value}")]
-    command = "import sys; from service.cli import main; sys.exit(main())"
+    command = "import sys; from service.cli.program import main; sys.exit(main())"
     assert run(folder, command, "render", "scene.json", "-o", "cli.npy", *options).returncode == 0
     assert np.array_equal(np.load(folder / "local.npy"), np.load(folder / "cli.npy"))
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings
+from service.document import parse_scene
 from service.pack import Packed, pack
-from service.scene import parse_scene
 from tests.rays import ball_mesh, to_world
 from tests.rendering import Images
 

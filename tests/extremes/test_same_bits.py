@@ -13,7 +13,7 @@ import pytest
 from gpu import ESTIMATORS, Renderer, RenderSettings
 from gpu.picture import tiles as cutting
 from gpu.settings import SAMPLERS
-from service.cli import main
+from service.cli.program import main
 from tests.extremes.scenes import LONG, everything, icosphere, packed
 from tests.rendering import document
 from tests.serving import Server

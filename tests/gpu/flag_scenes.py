@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from gpu.layout.microfacet_records import PLAIN, TERMS
-from service.assets import AssetLimits, MeasuredData
-from service.assets.measured.adaptive import parse_adaptive
-from service.assets.measured.merl import parse_merl
+from service.formats import AssetLimits, MeasuredData
+from service.formats.read.measured.adaptive import parse_adaptive
+from service.formats.read.measured.merl import parse_merl
 from tests import measured_files
 from tests.extremes.scenes import ball, icosphere, quad
 from tests.rendering import Images, document

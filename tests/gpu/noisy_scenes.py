@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
+from service.document import presets
 from tests.rendering import document
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

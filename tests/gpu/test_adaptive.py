@@ -16,7 +16,7 @@ from gpu.layout.bindings import Slot
 from gpu.picture import adaptive
 from gpu.picture.noise_meter import FROM
 from gpu.picture.sample_plan import DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
-from service.cli import main
+from service.cli.program import main
 from tests.gpu.noisy_scenes import SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture
 from tests.serving import PATIENCE_S, SCENE, SMALL, Client, Server

@@ -14,8 +14,8 @@ from gpu.bsdf import kernels
 from gpu.layout import models
 from gpu.layout.models import NUMBERS
 from gpu.precompile import kernel_keys
+from service.document.material.microfacet import MicrofacetMaterial
 from service.pack import pack_material
-from service.scene.material.microfacet import MicrofacetMaterial
 from tests import baseline, disney, microfacets
 from tests.lobes import LAYERED, OPENPBR, PRINCIPLED, ROWS
 from tests.marks import seldom

@@ -10,11 +10,11 @@ import pytest
 
 from gpu import Renderer, RenderSettings, Scene, SceneEdit
 from gpu.precompile import fallback
+from service.document import parse_scene
 from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.ipc.task_control import Pause
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.helpers.compile_client import records
 from service.worker.view.first_look import FirstLook
 from tests.documents import Shelf

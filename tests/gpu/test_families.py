@@ -7,8 +7,8 @@ import pytest
 
 from gpu import RenderSettings
 from gpu.kernels.flag_table import FLAGS
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.families import FAMILIES, FamilyRenderer, family
 from tests.gpu.flag_scenes import IMAGES, SCENES
 from tests.marks import seldom

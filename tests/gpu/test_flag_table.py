@@ -14,9 +14,9 @@ from gpu.kernels.flag import ANYWHERE, Flag
 from gpu.kernels.flag_table import FLAGS
 from gpu.layout.models import FLAGGED
 from gpu.precompile import fallback, kernel_keys
+from service.document import parse_scene
+from service.document.material import PrincipledMaterial
 from service.pack import pack, pack_material
-from service.scene import parse_scene
-from service.scene.material import PrincipledMaterial
 from tests.gpu.flag_scenes import IMAGES, made_of
 from tests.rendering import document
 

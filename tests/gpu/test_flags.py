@@ -14,8 +14,8 @@ from gpu.arrays import SceneArrays
 from gpu.kernels.features import flags, grown
 from gpu.kernels.flag_table import FLAGS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
+from service.document import parse_scene
 from service.pack import Packed, pack
-from service.scene import parse_scene
 from tests.extremes.scenes import LONG, ball, icosphere
 from tests.gpu.flag_scenes import FLOOR, IMAGES, LAMP, SCENES, Doc, T, lit, made_of
 from tests.marks import seldom

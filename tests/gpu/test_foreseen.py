@@ -12,10 +12,10 @@ import pytest
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.precompile import fallback
 from gpu.precompile.kernel_keys import keys_after_edit
+from service.document import parse_scene
 from service.ipc.messages import Foresee, Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.device.loaded_scene import begin_key, slider_keys
 from service.worker.helpers.compile_client import records
 from tests.documents import Shelf

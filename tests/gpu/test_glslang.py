@@ -14,8 +14,8 @@ from gpu import RenderSettings
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.precompile.kernel_keys import common_keys
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.gpu.flag_scenes import IMAGES, SCENES
 from tests.marks import seldom
 

@@ -18,8 +18,8 @@ from gpu.kernels import binaries
 from gpu.kernels.binaries import Program, ProgramBinaries, binary_file
 from gpu.precompile.kernel_keys import GUIDES, KernelKey, kernel_key
 from gpu.precompile.precompiler import Precompiler
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench import standin
 from tests.families import FamilyRenderer
 from tests.rendering import Images, document, picture

@@ -11,9 +11,9 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.kernels import features, instances_glsl
 from gpu.kernels.source import SHADERS, KernelSource
+from service.document import parse_scene
 from service.pack import pack
 from service.pack.geometry import instances
-from service.scene import parse_scene
 from tests import documents
 from tests.extremes.scenes import LONG, moved, rows
 from tests.gpu.instanced import IMAGES, MIRRORED, Doc, bumpy, two

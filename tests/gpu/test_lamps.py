@@ -11,8 +11,8 @@ import pytest
 from gpu.arrays import SceneArrays
 from gpu.device import lamps
 from gpu.layout import LightKind
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document
 
 FOG = {"type": "constant", "radiance": 1, "medium": {"scattering": 0.1}}

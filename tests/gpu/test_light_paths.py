@@ -13,8 +13,8 @@ from gpu.kernels import features
 from gpu.kernels.caustics import MOST_TARGETS, sources, targets
 from gpu.kernels.deltas import may_be_specular
 from gpu.picture.light_paths import samples_with_paths
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.gpu.bits import assert_same, beside, saved
 from tests.rendering import Images, document, picture
 

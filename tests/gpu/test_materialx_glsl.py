@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.assets.materialx.document import read_document
-from service.assets.materialx.evaluation import Places, bands
-from service.assets.materialx.graph import Graphs
-from service.assets.materialx.images import Images
-from service.assets.scenes.warnings import Warnings
-from service.assets.types import AssetLimits
+from service.formats.read.materialx.document import read_document
+from service.formats.read.materialx.evaluation import Places, bands
+from service.formats.read.materialx.graph import Graphs
+from service.formats.read.materialx.images import Images
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.types import AssetLimits
 from tests.mtlx_files import graph, mtlx, node, value, wire
 
 pytest.importorskip("MaterialX")

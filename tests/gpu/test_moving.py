@@ -11,10 +11,10 @@ from gpu import Renderer, RenderSettings, SceneArrays
 from gpu.kernels import features
 from gpu.layout import Instance, Node
 from gpu.precompile import kernel_keys
+from service.document import parse_scene
 from service.pack import PackCache, pack, scene_edit
 from service.pack.edits import moved_meshes
 from service.pack.geometry import instances
-from service.scene import parse_scene
 from tests.gpu.instanced import IMAGES, two
 
 Doc = dict[str, Any]

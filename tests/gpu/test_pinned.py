@@ -11,8 +11,8 @@ from gpu import Renderer, RenderSettings
 from gpu.arrays import SceneArrays
 from gpu.device.pinned import LEAST, Pinned, pin
 from gpu.device.scene import Scene
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 
 SIDE = 100  # vertices: 19 602 triangles, nearly a megabyte
 

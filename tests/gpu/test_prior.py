@@ -10,8 +10,8 @@ import pytest
 
 from gpu import Renderer
 from gpu.picture import prior
+from service.document import parse_scene
 from service.pack.parameters import pack_camera
-from service.scene import parse_scene
 from tests.rendering import picture
 from tests.serving import SCENE
 

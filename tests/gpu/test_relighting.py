@@ -11,8 +11,8 @@ import pytest
 
 from gpu import OutOfMemory, Renderer, RenderSettings, Scene
 from gpu.device import buffers
+from service.document import parse_scene
 from service.pack import PackCache, pack, scene_edit
-from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.documents import picture as image
 from tests.rendering import document

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, SceneTooLarge, WrongThread, layout
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document, picture
 
 SCENE = document([], environment={"type": "constant", "radiance": 0.5})

@@ -11,8 +11,8 @@ import pytest
 from gpu import OutOfMemory, Picture, Renderer, RenderSettings, picture_bytes, scene_bytes
 from gpu import context as contexts
 from gpu.picture import picture as pictures
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document, picture
 
 SCENE = document(

@@ -9,8 +9,8 @@ import numpy as np
 
 from gpu import Renderer, RenderSettings, SceneArrays
 from gpu.device.uploads import Textures, UploadCache
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document
 
 BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}

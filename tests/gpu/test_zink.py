@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service import presets
+from service.document import presets
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
@@ -32,7 +32,7 @@ from gpu import Renderer, RenderSettings, software_device
 from service import presets
 from service.bench.scenes import BenchAssets
 from service.pack import pack
-from service.scene import parse_scene
+from service.document import parse_scene
 
 out, size, samples, *names = sys.argv[1:]
 with Renderer(software_device()) as renderer:

@@ -25,8 +25,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from service.renders.store.store import RenderStore
-from service.storage.database import FILE
+from service.server.renders.store.store import RenderStore
+from service.server.storage.database import FILE
 from tests.serving import SCENE, Server, kill
 
 FOLDERS = Path(__file__).parent / "folders"

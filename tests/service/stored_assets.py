@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from service.storage.stores import Storage
+from service.server.storage.stores import Storage
 from service.system.disk_usage import BLOCK
 from tests.serving import SCENE
 

@@ -11,12 +11,12 @@ import httpx
 import numpy as np
 import pytest
 
-from service import presets
 from service.config import Config
+from service.document import presets
 from service.problems import InvalidDocument, NotFound
-from service.storage.database import Database
-from service.storage.documents import BY_LINK, PRIVATE, SHARED, checked
-from service.storage.stores import Storage, storage
+from service.server.storage.database import Database
+from service.server.storage.documents import BY_LINK, PRIVATE, SHARED, checked
+from service.server.storage.stores import Storage, storage
 from tests.asset_files import OBJ, glb, gltf, png
 from tests.calls import is_problem
 from tests.service.stored_assets import mesh_scene

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import scene as scenes
-from service.app import create_app
 from service.config import Config
+from service.document import references, schema
+from service.document.axes import PosedTimes
 from service.problems import InvalidDocument
-from service.requests.request_parser import folded
-from service.scene import references
-from service.scene.axes import PosedTimes
-from service.state import AppState
+from service.server.app import create_app
+from service.server.requests.request_parser import folded
+from service.server.state import AppState
 from tests.asset_files import OBJ, png
 from tests.serving import SCENE, SMALL, Client, Server
 
@@ -64,8 +63,8 @@ def texts(node: dict[str, Any], definitions: dict[str, Any], place: Place = (), 
 
 
 def test_a_text_of_a_scene_names_an_asset_or_something_in_the_scene() -> None:
-    schema = scenes.schema()["scene"]
-    found = {place for place in texts(schema, schema["$defs"]) if place[-1] not in NAMES}
+    every = schema()["scene"]
+    found = {place for place in texts(every, every["$defs"]) if place[-1] not in NAMES}
     assert found == PARTS.keys(), "is it an asset? then references.places has to know it"
     for place, part in PARTS.items():
         assert [where for where, ref in references.places(part(MISSING, "own")) if ref == MISSING] == [place]

@@ -11,9 +11,9 @@ import pytest
 
 from service.config import Config
 from service.problems import TooLarge, Unavailable
-from service.storage.database import Database
-from service.storage.documents import checked
-from service.storage.stores import Storage, storage
+from service.server.storage.database import Database
+from service.server.storage.documents import checked
+from service.server.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
 from tests.asset_files import OBJ, glb, gltf
 from tests.service.stored_assets import ASSET, file, here, mesh_scene

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from service.renders.store.check import check_renders
-from service.storage.data_check import check
-from service.storage.database import FILE
+from service.server.renders.store.check import check_renders
+from service.server.storage.data_check import check
+from service.server.storage.database import FILE
 from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, kill, wait_until
 
 ROUGHNESS = {"path": "/materials/ball/roughness", "values": [0.1, 0.9]}

@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-from service.app import create_app
 from service.config import Config
+from service.document.text import most_bytes
 from service.problems import Unavailable
-from service.renders.job import Job
-from service.requests.bodies import SMALL
-from service.routes.submission import allowed
-from service.scene.text import most_bytes
-from service.state import AppState
+from service.server.app import create_app
+from service.server.renders.job import Job
+from service.server.requests.bodies import SMALL
+from service.server.routes.submission import allowed
+from service.server.state import AppState
 from service.system.executors import Pool, packing, saving, storing
 from tests.calls import loaded
 

@@ -14,8 +14,8 @@ import httpx
 import numpy as np
 import pytest
 
-from service.requests.bsdf_request import MOST_PAIRS, MOST_WORK, in_plane, normalized
-from service.routes.bsdf import _values
+from service.server.requests.bsdf_request import MOST_PAIRS, MOST_WORK, in_plane, normalized
+from service.server.routes.bsdf import _values
 from tests import baseline
 from tests.probing import materials
 from tests.serving import ENDLESS, Server, client

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from gpu import Renderer
-from service.cli import main
+from service.cli.program import main
 from service.views import BSDF_KINDS
 from tests import baseline
 from tests.marks import seldom
@@ -182,7 +182,7 @@ def test_mistakes_leave_no_file(
 def test_figures_need_matplotlib(
     write: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("service.commands.bsdf.find_spec", lambda name: None)
+    monkeypatch.setattr("service.cli.bsdf.find_spec", lambda name: None)
     assert main(["bsdf", write("m", GREY), "-o", str(tmp_path / "m.svg")]) == 2
     assert "sunbox[plot]" in capsys.readouterr().err
     assert table(tmp_path, write("m", GREY))

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from service.callback_hosts import CallbackHosts
-from service.callbacks import posting
 from service.config import ConfigError, load_config
+from service.server.callbacks import posting
 from tests.service.receiving import Receiver
 
 

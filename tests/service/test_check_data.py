@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from service import cli
+from service.cli import program as cli
 from service.config import Config
-from service.storage.data_check import Report, check
-from service.storage.data_lock import locked
-from service.storage.database import FILE
-from service.storage.documents import checked
-from service.storage.stores import Storage, storage
+from service.server.storage.data_check import Report, check
+from service.server.storage.data_lock import locked
+from service.server.storage.database import FILE
+from service.server.storage.documents import checked
+from service.server.storage.stores import Storage, storage
 from tests.asset_files import OBJ
 from tests.serving import SCENE
 

@@ -19,11 +19,12 @@ import pytest
 from gpu import settings as gpu_settings
 from gpu.analysis.kernel_cost import KernelCost
 from gpu.picture import passes
-from service import images, views
-from service.cli import main
-from service.commands.progress import ProgressLine, describe
+from service import views
+from service.cli.program import main
+from service.cli.progress import ProgressLine, describe
 from service.config import load_config
-from service.images import read_metadata
+from service.formats import images
+from service.formats.images import read_metadata
 from service.ipc.messages import Progress
 from service.worker.progress import stop_rules
 
@@ -69,7 +70,7 @@ def refused(capsys: pytest.CaptureFixture[str], folder: Path, *arguments: str) -
 def test_scene_mistake_names_its_pointer(
     change: dict[str, Any], pointer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Which others there are, `tests/service/scene/test_refusals.py` has; files are the command line's own."""
+    """Which others there are, `tests/service/document/test_refusals.py` has; files are the command line's own."""
     source = tmp_path / "scene.json"
     source.write_text(json.dumps({**SCENE, **change}))
     assert f"error: {pointer}: " in refused(capsys, tmp_path, str(source), "-o", str(tmp_path / "out.npy"))
@@ -118,7 +119,7 @@ def test_input_and_output_are_checked(scene: Path, tmp_path: Path, capsys: pytes
 
 def test_mistakes_are_found_before_opengl_is_loaded(scene: Path, tmp_path: Path) -> None:
     program = (
-        "import sys; from service.cli import main\n"
+        "import sys; from service.cli.program import main\n"
         f"code = main(['render', {str(scene)!r}, '-o', {str(tmp_path / 'a.png')!r}, '--set', 'width=0'])\n"
         "heavy = {'moderngl', 'numba', 'fastapi', 'trimesh', 'OpenImageIO', 'PIL'} & set(sys.modules)\n"
         "sys.exit(code if not heavy else str(heavy))"
@@ -130,7 +131,7 @@ def test_mistakes_are_found_before_opengl_is_loaded(scene: Path, tmp_path: Path)
 def test_the_process_ends_with_its_command_s_code_after_all_that_was_registered(tmp_path: Path) -> None:
     program = (
         "import atexit, sys, threading, time\n"
-        "from service import cli\n"
+        "from service.cli import program as cli\n"
         "def work():\n"
         "    time.sleep(0.2)\n"
         "    print('worked', end=' ')\n"

@@ -16,9 +16,9 @@ import pytest
 from PIL import Image
 
 from service.ipc.messages import Progress, View
-from service.routes.compare import _estimate
-from service.verdict.evidence import Estimate
-from service.verdict.figures import displayed
+from service.server.routes.compare import _estimate
+from service.server.verdict.evidence import Estimate
+from service.server.verdict.figures import displayed
 from service.worker.view.frames import pixels_of
 from tests.calls import is_problem, metrics, pixels, start, status
 from tests.serving import Server, wait_until

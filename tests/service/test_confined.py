@@ -18,11 +18,11 @@ from typing import Any
 
 import pytest
 
-from service.app import create_app
-from service.assets.sandbox.sandbox import Sandbox
-from service.assets.types import AssetLimits
 from service.config import Config
-from service.state import AppState
+from service.formats.sandbox.sandbox import Sandbox
+from service.formats.types import AssetLimits
+from service.server.app import create_app
+from service.server.state import AppState
 from service.system.child_processes import ROOT, Children, inherited_environment
 from service.system.confined import Rights, rights, seccomp
 from service.system.confined.landlock import RIGHTS
@@ -216,7 +216,7 @@ def test_seccomp_alone(tmp_path: Path, victim: int, python: str) -> None:
 
 def test_the_children_that_parse_have_given_up_their_rights(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
-    bodies = Children("service.requests.parser_child", 1)
+    bodies = Children("service.server.requests.parser_child", 1)
     with Sandbox(AssetLimits()) as box:
         rights = box.rights()
         assert rights == box.rights() == bodies.rights()

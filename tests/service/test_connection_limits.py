@@ -17,13 +17,13 @@ import uvicorn
 from starlette.types import Message, Receive, Scope, Send
 
 from service.config import Config
-from service.http import connection_limits, guard
-from service.http.connection_limits import Room, Watch
-from service.http.connections import connection_class
-from service.http.guard import Guard, open_for_health, turning_away
-from service.http.listener import listen
 from service.problems import Unavailable
-from service.routes.errors import respond
+from service.server.http import connection_limits, guard
+from service.server.http.connection_limits import Room, Watch
+from service.server.http.connections import connection_class
+from service.server.http.guard import Guard, open_for_health, turning_away
+from service.server.http.listener import listen
+from service.server.routes.errors import respond
 
 LARGE = 4 << 20
 RATE = 2 << 20  # bytes a second, of the slow reader

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.http.connections import JOINED, MOST_BESIDE, JoinedWrites
+from service.server.http.connections import JOINED, MOST_BESIDE, JoinedWrites
 from tests.serving import Server
 
 
@@ -150,7 +150,7 @@ def test_a_vanished_peer_is_noticed(server: Server) -> None:
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
 def test_a_listener_hands_its_options_on(host: str) -> None:
-    from service.http.listener import listen
+    from service.server.http.listener import listen
 
     try:
         listener = listen(host, 0)

@@ -12,9 +12,9 @@ import httpx
 import numpy as np
 import pytest
 
-from service import images
-from service.images.cryptomatte import Cryptomatte, id_bits, murmur3, names_of
-from service.images.metadata import exr_attributes
+from service.formats import images
+from service.formats.images.cryptomatte import Cryptomatte, id_bits, murmur3, names_of
+from service.formats.images.metadata import exr_attributes
 from tests.calls import is_problem
 from tests.serving import SCENE, SMALL, Server
 

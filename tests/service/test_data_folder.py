@@ -17,16 +17,16 @@ from pathlib import Path
 import pytest
 import uvicorn
 
-from service import launch
 from service.config import Config
 from service.problems import Unavailable
-from service.storage import data_lock, database
-from service.storage.data_check import Report, check
-from service.storage.data_lock import FolderInUse, holder, locked
-from service.storage.database import FILE, Database
-from service.storage.documents import checked
-from service.storage.migrations import MIGRATIONS, VERSION, Migration
-from service.storage.stores import Storage, storage
+from service.server import launch
+from service.server.storage import data_lock, database
+from service.server.storage.data_check import Report, check
+from service.server.storage.data_lock import FolderInUse, holder, locked
+from service.server.storage.database import FILE, Database
+from service.server.storage.documents import checked
+from service.server.storage.migrations import MIGRATIONS, VERSION, Migration
+from service.server.storage.stores import Storage, storage
 from tests.service import frozen
 from tests.service.frozen import FOLDERS, NAMES
 
@@ -117,7 +117,7 @@ def test_what_a_caller_does_wrong_is_no_problem_of_the_disk(
         file.execute("SELECT * FROM nothing")
 
 
-HOLD = "import sys, time; from pathlib import Path; from service.storage.data_lock import locked\n"
+HOLD = "import sys, time; from pathlib import Path; from service.server.storage.data_lock import locked\n"
 HOLD += "with locked(Path(sys.argv[1])): print(flush=True); time.sleep(60)"
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from service.assets import AssetStore
 from service.config import Config
 from service.problems import TooLarge
-from service.storage.documents import Documents, checked
-from service.storage.stores import DOCUMENTS_PART, storage
+from service.server.assets import AssetStore
+from service.server.storage.documents import Documents, checked
+from service.server.storage.stores import DOCUMENTS_PART, storage
 
 DOCUMENT = checked("materials", {"type": "diffuse", "albedo": 0.5})
 SIZE = len(DOCUMENT.body)

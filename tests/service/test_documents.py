@@ -20,15 +20,15 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import launch
-from service.assets import AssetStore
 from service.config import Config
-from service.http.downloads import Downloads, FileAnswer
 from service.problems import Forbidden, NotFound, TooLarge, Unavailable
-from service.routes.documents import document
-from service.storage import database, documents, migrations
-from service.storage.database import DamagedFile
-from service.storage.documents import Documents, checked
+from service.server import launch
+from service.server.assets import AssetStore
+from service.server.http.downloads import Downloads, FileAnswer
+from service.server.routes.documents import document
+from service.server.storage import database, documents, migrations
+from service.server.storage.database import DamagedFile
+from service.server.storage.documents import Documents, checked
 from tests.asset_files import OBJ
 from tests.calls import is_problem
 from tests.serving import SCENE, Server
@@ -95,8 +95,8 @@ def test_documents_survive_a_kill(saved: Documents, store: AssetStore, tmp_path:
     program = f"""
 import sys
 from pathlib import Path
-from service.assets import AssetStore
-from service.storage.documents import Documents, checked
+from service.formats import AssetStore
+from service.server.storage.documents import Documents, checked
 folder = Path({str(tmp_path)!r})
 documents = Documents(folder, AssetStore(folder))
 for i in range(10 ** 6):

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from service.http import downloads
-from service.http.downloads import PIECE, SMALL, Downloads, FileAnswer, Pieces
 from service.problems import TooManyRequests, Unavailable
+from service.server.http import downloads
+from service.server.http.downloads import PIECE, SMALL, Downloads, FileAnswer, Pieces
 from service.system.memory import MemoryBudget
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, SCENE, Server, wait_until

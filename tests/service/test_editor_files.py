@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from service.app import WEB
+from service.server.app import WEB
 from tests.serving import Server
 
 MODULES = sorted(WEB.rglob("*.js"))

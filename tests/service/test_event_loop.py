@@ -15,26 +15,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import presets
-from service.app import create_app
-from service.batches.batch import Batch, member_id
 from service.config import Config
-from service.http.keys import Keys
-from service.images import LAYERS
+from service.document import presets
+from service.document.material import MODELS
+from service.document.quality import resolve
+from service.document.settings import Settings
+from service.formats.images import LAYERS
 from service.ipc.messages import Progress, View
-from service.operation.readiness import Readiness
-from service.quality import resolve
 from service.renderers.pool.pool import Pool
-from service.renders.job import Job
-from service.renders.store.batch_rows import BatchOrder
-from service.renders.store.record import Order, Outcome
-from service.renders.viewer import PictureViewer
-from service.requests.request_parser import folded
-from service.scene.material import MODELS
-from service.scene.settings import Settings
-from service.state import AppState
-from service.storage import callback_rows, documents
-from service.storage.database import Database
+from service.server.app import create_app
+from service.server.batches.batch import Batch, member_id
+from service.server.http.keys import Keys
+from service.server.operation.readiness import Readiness
+from service.server.renders.job import Job
+from service.server.renders.store.batch_rows import BatchOrder
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.viewer import PictureViewer
+from service.server.requests.request_parser import folded
+from service.server.state import AppState
+from service.server.storage import callback_rows, documents
+from service.server.storage.database import Database
 from tests.calls import loaded
 from tests.counting import LoopWork
 from tests.gltf_files import Gltf
@@ -105,7 +105,7 @@ async def ready(readiness: Readiness) -> None: ...
 def test_no_answer_holds_the_event_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PictureViewer, "image", black)
     monkeypatch.setattr(Readiness, "check", ready)
-    monkeypatch.setattr("service.app.Pool", lambda *_: Renderers())
+    monkeypatch.setattr("service.server.app.Pool", lambda *_: Renderers())
 
     async def run() -> None:
         app = create_app(Config(data_dir=tmp_path, api_key=["a"]))

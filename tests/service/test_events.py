@@ -6,8 +6,8 @@ import asyncio
 from contextlib import suppress
 from typing import Any, cast
 
-from service.renders.job import Job
-from service.routes import events
+from service.server.renders.job import Job
+from service.server.routes import events
 from tests.counting import in_simulated_time
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, Steps
-from service import presets
+from service.document import presets
 from service.pack import pack_material
-from service.requests.bsdf_request import parse_material
+from service.server.requests.bsdf_request import parse_material
 
 # As tabulated in Dupuy's dj_brdf: A per channel, B, C and the index of refraction [Loew et al. 2012].
 ABC: dict[str, tuple[list[float], float, float, float]] = {

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from service import presets
-from service.routes.examples import ASSET, BATCH, RENDER, SCENE
+from service.document import presets
+from service.server.routes.examples import ASSET, BATCH, RENDER, SCENE
 from tests.serving import SMALL, Server
 
 PACKAGE = "generated_sunbox_client"

@@ -17,11 +17,11 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from service.config import Config, ConfigError, load_config
-from service.http.downloads import disconnected
-from service.http.guard import Guard, _Body
-from service.http.keys import Keys
 from service.problems import TooLarge, Unauthorized
-from service.routes.errors import respond
+from service.server.http.downloads import disconnected
+from service.server.http.guard import Guard, _Body
+from service.server.http.keys import Keys
+from service.server.routes.errors import respond
 from tests.asset_files import OBJ
 from tests.calls import is_problem
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, SPARE_KEY, Client, Server

@@ -23,8 +23,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from PIL import Image
 from schemathesis.specs.openapi import checks
 
-from service import presets
-from service.routes.examples import SCENE
+from service.document import presets
+from service.server.routes.examples import SCENE
 from tests import asset_files as make
 from tests import serving
 from tests.hostile import mutated_bytes, mutated_document, mutated_json

@@ -12,14 +12,14 @@ from typing import Any
 import httpx
 import pytest
 
-from service.app import create_app
 from service.config import Config
 from service.problems import Unavailable
-from service.renders.store.batch_rows import BatchOrder, BatchRows
-from service.renders.store.record import IdempotencyKey
-from service.renders.store.rows import KEY_S
-from service.storage.asset_access import NO_USES
-from service.storage.database import Database
+from service.server.app import create_app
+from service.server.renders.store.batch_rows import BatchOrder, BatchRows
+from service.server.renders.store.record import IdempotencyKey
+from service.server.renders.store.rows import KEY_S
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.database import Database
 from tests.serving import SCENE, SMALL, Server
 
 BODIES: dict[str, Any] = {

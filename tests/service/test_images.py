@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from service import displays, images, views
+from service import displays, views
 from service.colorimetry import decode_srgb as srgb_to_linear
 from service.colorimetry import encode_srgb
-from service.images import icc
-from service.images.metadata import exr_attributes
+from service.formats import images
+from service.formats.images import icc
+from service.formats.images.metadata import exr_attributes
 from tests.asset_files import png, read_exr, read_hdr, read_png
 
 RNG = np.random.default_rng(3)

@@ -16,10 +16,10 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service import app
-from service.http import connection_limits, connections
+from service.server import app
+from service.server.http import connection_limits, connections
 
-SERVICE = Path(app.__file__).parent
+SERVICE = Path(app.__file__).parents[1]
 MORE = {"_end"}  # methods that uvicorn does not know
 
 

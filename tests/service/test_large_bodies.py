@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from service.config import Config
+from service.document import MeshShape, Scene
 from service.problems import FieldError, ServiceError
-from service.requests import parser_pool
-from service.requests.bodies import SMALL
-from service.requests.parser_pool import ParserPool
-from service.requests.parsers import PARSERS, Kind
-from service.scene import MeshShape, Scene
+from service.server.requests import parser_pool
+from service.server.requests.bodies import SMALL
+from service.server.requests.parser_pool import ParserPool
+from service.server.requests.parsers import PARSERS, Kind
 from tests.serving import SCENE, Server
 from tests.serving import SMALL as SETTINGS
 

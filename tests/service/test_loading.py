@@ -9,10 +9,10 @@ from typing import Any
 import httpx
 import pytest
 
-from service import app as application
-from service.app import create_app
 from service.config import Config
-from service.state import AppState
+from service.server import app as application
+from service.server.app import create_app
+from service.server.state import AppState
 from tests.calls import is_problem
 
 ANSWERED = {

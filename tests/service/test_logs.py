@@ -14,9 +14,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.logs import output as log_output
-from service.logs import setup
-from service.logs.formatters import Console, Json, bound
+from service.system.logs import output as log_output
+from service.system.logs import setup
+from service.system.logs.formatters import Console, Json, bound
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, Client, Server, wait_until
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from service.document import parse_scene
+from service.document.material import MODELS
+from service.document.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from service.problems import InvalidDocument
-from service.requests.conversion_request import parse_conversion
-from service.scene import parse_scene
-from service.scene.material import MODELS
-from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
+from service.server.requests.conversion_request import parse_conversion
 from tests import microfacets
 from tests.serving import SCENE, Server
 

@@ -10,8 +10,8 @@ import httpx
 import numpy as np
 import pytest
 
-from service.scene import references
-from service.storage.documents import checked
+from service.document import references
+from service.server.storage.documents import checked
 from tests import measured_files
 from tests.measured_files import Facets
 from tests.serving import SCENE, SMALL, Server, client, wait_until

@@ -16,18 +16,19 @@ import numpy as np
 import pytest
 from starlette.requests import Request
 
-from service.app import create_app
-from service.assets import AssetStore, ImageData
-from service.assets.cache import ParsedCache
-from service.assets.types import AssetLimits
 from service.config import MIB, Config
+from service.document.text import most_bytes
+from service.formats import ImageData
+from service.formats.cache import ParsedCache
+from service.formats.types import AssetLimits
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, CacheBudget, PackCache
 from service.problems import TooLarge, TooManyRequests, Unavailable
-from service.requests.bodies import Bodies
-from service.requests.request_reader import RequestReader
-from service.scene.text import most_bytes
-from service.streams import protocol
-from service.streams.edit_session import EditSession
+from service.server.app import create_app
+from service.server.assets import AssetStore
+from service.server.requests.bodies import Bodies
+from service.server.requests.request_reader import RequestReader
+from service.server.streams import protocol
+from service.server.streams.edit_session import EditSession
 from service.system import memory
 from service.system.memory import Limit, MemoryBudget, machine_memory
 from service.system.turns import CALLER

@@ -13,10 +13,10 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from service.app import create_app, server_settings
 from service.config import Config, ConfigError, load_config
-from service.http.guard import OPEN_OF_A_KEY, Guard
-from service.routes.errors import respond
+from service.server.app import create_app, server_settings
+from service.server.http.guard import OPEN_OF_A_KEY, Guard
+from service.server.routes.errors import respond
 from tests.calls import is_problem
 from tests.serving import Server
 

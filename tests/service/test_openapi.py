@@ -8,9 +8,9 @@ import httpx
 import jsonschema_rs
 import pytest
 
-from service.routes.answers import Info, Schemas
-from service.routes.description import NAMES
-from service.scene import MeshShape
+from service.document import MeshShape
+from service.server.routes.answers import Info, Schemas
+from service.server.routes.description import NAMES
 from tests.serving import Server
 
 

@@ -18,11 +18,11 @@ import httpx
 import pytest
 import uvicorn
 
-from service import app, launch
 from service.config import GIB, MAX_PIXELS, MIB, Config
-from service.logs import setup
-from service.routes.metrics import scrape
-from service.state import AppState
+from service.server import app, launch
+from service.server.routes.metrics import scrape
+from service.server.state import AppState
+from service.system.logs import setup
 from tests.calls import metrics
 from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, client, wait_until
 

@@ -9,8 +9,8 @@ import pytest
 import trimesh
 from trimesh.visual import ColorVisuals
 
-from service.presets import lettering
-from service.presets.generated import ASSETS, asset
+from service.document.presets import lettering
+from service.document.presets.generated import ASSETS, asset
 
 MESHES = [name for name in ASSETS if asset(name).startswith(b"ply")]
 # Glass, wax and flames, whose inside counts.

@@ -13,15 +13,14 @@ import OpenImageIO as oiio
 import pytest
 
 from gpu import Renderer, RenderSettings
-from service import presets
-from service.assets import AssetStore
+from service.document import check_saved_material, parse_scene, presets
+from service.document.material.disney import DisneyMaterial
+from service.document.material.surface import Surface
+from service.document.presets import latlong, physically_based
+from service.document.presets.generated import ASSETS, asset, asset_id
 from service.pack import pack
-from service.presets import latlong, physically_based
-from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
-from service.scene import check_saved_material, parse_scene
-from service.scene.material.disney import DisneyMaterial
-from service.scene.material.surface import Surface
+from service.server.assets import AssetStore
 from tests.counting import python_lines
 from tests.marks import seldom
 

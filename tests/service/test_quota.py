@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from service.assets import AssetStore
-from service.assets.folder_totals import TOTALS
 from service.config import Config
 from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
-from service.storage.documents import checked
-from service.storage.stores import Storage, storage
+from service.server.assets import AssetStore
+from service.server.assets.folder_totals import TOTALS
+from service.server.storage.documents import checked
+from service.server.storage.stores import Storage, storage
 from service.system.disk_usage import BLOCK, Usage
 from tests.asset_files import OBJ, glb, gltf
 from tests.service.stored_assets import ASSET, file, here, mesh_scene
@@ -180,7 +180,7 @@ def test_what_a_killed_upload_leaves_does_not_count(kept: Storage, tmp_path: Pat
     program = f"""
 import os, sys
 from pathlib import Path
-from service.assets.folder import AssetFolder
+from service.server.assets.folder import AssetFolder
 def stop(fd):
     print(flush=True)
     sys.stdin.read()
@@ -219,7 +219,7 @@ def test_leftovers_are_cleared_away(kept: Storage, tmp_path: Path) -> None:
 def test_a_server_clears_away_what_a_crash_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import uvicorn
 
-    from service import launch
+    from service.server import launch
 
     (tmp_path / "assets").mkdir()
     (tmp_path / "assets" / ".abcd.tmp").write_bytes(b"half")
@@ -304,7 +304,7 @@ def test_a_change_that_was_killed_is_counted(kept: Storage, tmp_path: Path) -> N
     program = f"""
 import os, signal
 from pathlib import Path
-from service.assets.folder import AssetFolder
+from service.server.assets.folder import AssetFolder
 replace = os.replace
 def stop(*paths):
     replace(*paths)

@@ -11,17 +11,17 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import pytest
 
-from service.assets import Assets
 from service.config import Config
-from service.http.downloads import Downloads
+from service.formats import Assets
 from service.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
-from service.operation import readiness
-from service.operation.readiness import Readiness
 from service.problems import Unavailable
-from service.renderers.first_frame import foresee, warm_up
 from service.renderers.protocol import Listener
 from service.renderers.statistics import Kind, Statistics
-from service.requests.request_reader import RequestReader
+from service.server.first_frame import foresee, warm_up
+from service.server.http.downloads import Downloads
+from service.server.operation import readiness
+from service.server.operation.readiness import Readiness
+from service.server.requests.request_reader import RequestReader
 from service.system.memory import MemoryBudget
 
 READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]

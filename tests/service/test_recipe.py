@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.cli import main
-from service.images import read_metadata, recipe
-from service.images.metadata import png_with_text
+from service.cli.program import main
+from service.document import references
+from service.formats.images import read_metadata, recipe
+from service.formats.images.metadata import png_with_text
 from service.problems import InvalidDocument
-from service.scene import references
 from tests.serving import PATIENCE_S, SCENE, Server
 
 OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from service.cli import main
+from service.cli.program import main
 from tests.serving import ENDLESS, SCENE, SMALL, Server
 
 OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"

@@ -19,7 +19,7 @@ import pytest
 from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
-from service.images import read_metadata
+from service.formats.images import read_metadata
 from tests.asset_files import OBJ, read_png
 from tests.calls import is_problem, pixels, start, status
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server, wait_until
@@ -194,7 +194,7 @@ def test_bad_bodies(http: httpx.Client, address: str, body: bytes, status: int, 
 
 
 def test_a_mistake_of_a_scene_is_pointed_at(http: httpx.Client) -> None:
-    """Which there are and what is said of each, `tests/service/scene/test_refusals.py` has."""
+    """Which there are and what is said of each, `tests/service/document/test_refusals.py` has."""
     materials = {"ball": {"type": "diffuse", "albedo": 2}, "floor": {"type": "disney"}}
     answer = http.post("/v1/renders", json={"scene": {**SCENE, "materials": materials}})
     assert is_problem(answer, 422, "/scene/materials/ball/albedo")

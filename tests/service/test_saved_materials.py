@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from service.assets import AssetStore
-from service.storage.documents import Documents, checked
+from service.server.assets import AssetStore
+from service.server.storage.documents import Documents, checked
 from tests.asset_files import png
 from tests.calls import is_problem
 from tests.serving import Server

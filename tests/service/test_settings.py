@@ -9,9 +9,9 @@ from typing import Any, get_args
 import pytest
 
 from service.config import ConfigError, load_config, unknown_variables
+from service.document import Settings, parse_settings
+from service.document.quality import PRESETS, ResolvedSettings, resolve
 from service.problems import InvalidDocument
-from service.quality import PRESETS, ResolvedSettings, resolve
-from service.scene import Settings, parse_settings
 
 NAN, INF = float("nan"), float("inf")
 

@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets.cache import ParsedCache
-from service.assets.folder import AssetFolder
-from service.assets.integrity import Integrity
-from service.assets.source import digest
-from service.assets.types import AssetLimits, MeasuredData
+from service.formats.cache import ParsedCache
+from service.formats.source import digest
+from service.formats.types import AssetLimits, MeasuredData
 from service.pack.edits.cache import CacheBudget, PackCache
-from service.renders.scene import PackedScenes
-from service.renders.store.pictures import PictureFiles
-from service.requests.parser_pool import _Room
-from service.storage.asset_shares import AssetShares
-from service.storage.quota import Quota
+from service.server.assets.folder import AssetFolder
+from service.server.assets.integrity import Integrity
+from service.server.renders.scene import PackedScenes
+from service.server.renders.store.pictures import PictureFiles
+from service.server.requests.parser_pool import _Room
+from service.server.storage.asset_shares import AssetShares
+from service.server.storage.quota import Quota
 from service.system import background, garbage, shared_memory
 from service.system.background import count_death
 from service.system.child_processes import Children
@@ -372,7 +372,7 @@ HAMMERS: dict[str, Callable[[Path], Hammer]] = {
     "system/shared_memory.py": _blocks,
 }
 ELSEWHERE = {
-    "Sandbox": "a process for each file: tests/service/assets tests its turns",
+    "Sandbox": "a process for each file: tests/service/formats tests its turns",
     "Animator": "one thread writes and one stops it: tests/service/test_contact_sheet.py",
 }
 

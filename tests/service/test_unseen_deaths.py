@@ -11,9 +11,9 @@ from typing import cast
 
 import pytest
 
-from service.logs import setup
 from service.system import background
 from service.system.background import report_callbacks
+from service.system.logs import setup
 
 SERVICE = Path(__file__).parents[2] / "service"
 TESTS = Path(__file__).parent / "rendering" / "test_background.py"

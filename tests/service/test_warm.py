@@ -8,8 +8,8 @@ import pytest
 
 from gpu import RenderSettings
 from gpu.precompile import kernel_keys
-from service import cli
-from service.commands import warm
+from service.cli import program as cli
+from service.cli import warm
 from service.config import load_config
 from service.worker import warming
 from service.worker.helpers.compile_client import records

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from service.state import MOST_WAITS
+from service.server.state import MOST_WAITS
 from tests.calls import pixels, start
 from tests.serving import ENDLESS, SCENE, SMALL, Server, wait_until
 

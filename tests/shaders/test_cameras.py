@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.document import parse_scene
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests.rendering import Images, document, render
 
 FLAT = {"type": "diffuse", "albedo": 0, "emission": 1}

@@ -13,9 +13,9 @@ from gpu.layout import ABSENT
 from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from service.config import Config
+from service.document import parse_scene
 from service.pack import pack
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests.gpu.flag_scenes import IMAGES, made_of
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 from tests.rendering import document, render

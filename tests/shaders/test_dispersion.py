@@ -13,8 +13,8 @@ from gpu import Renderer
 from gpu.kernels.features import flags
 from gpu.kernels.source import SHADERS
 from service import colorimetry
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.marks import seldom
 from tests.rendering import Images, assert_estimators_agree, document, picture, render
 

@@ -9,8 +9,8 @@ import pytest
 
 from gpu import TONE_MAPS, NothingRendered, Picture, Renderer, RenderSettings
 from gpu.picture.display import encode, srgb
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document, picture
 
 

@@ -16,8 +16,8 @@ from gpu.layout.bindings import Slot
 from gpu.layout.texture_records import Texels
 from gpu.picture import filters
 from gpu.tables.mip_levels import mip_levels, srgb_of_bytes
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.probing import PROBES
 from tests.rendering import Images, document, render
 from tests.shaders.textured import QUAD

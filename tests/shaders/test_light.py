@@ -12,8 +12,8 @@ import pytest
 
 from gpu import ESTIMATORS, FILTERS, Renderer, RenderSettings
 from gpu.kernels import features
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.extremes.scenes import LONG
 from tests.gpu import flag_scenes
 from tests.marks import BY_ESTIMATOR

@@ -12,9 +12,9 @@ from gpu import Renderer, SceneArrays, layout
 from gpu.accel import light_tree
 from gpu.kernels.features import flags
 from gpu.layout import LightKind
+from service.document import parse_scene
 from service.pack import PackCache, pack
 from service.pack.lights import light_bounds
-from service.scene import parse_scene
 from tests import stats
 from tests.extremes.scenes import Seen, everything, scaled
 from tests.light_trees import Picker, clusters_of, head_of, nodes_of, ways

@@ -10,8 +10,8 @@ import pytest
 
 from gpu import ESTIMATORS, Renderer
 from gpu.layout.bindings import Slot
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests import stats
 from tests.marks import BY_ESTIMATOR
 from tests.probing import prober_of

@@ -12,7 +12,7 @@ from gpu import Renderer, layout
 from gpu.kernels import deltas
 from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
-from service.scene.material.principled import index_of_specular, roughness_of_gloss
+from service.document.material.principled import index_of_specular, roughness_of_gloss
 from tests.probing import PRINCIPLED_FLAGS, materials, prober_of
 
 

@@ -13,11 +13,11 @@ import pytest
 from gpu import Renderer
 from gpu.kernels import features
 from gpu.layout.bindings import Slot
-from service.assets import AssetLimits, MeasuredData
-from service.assets.measured import merl
-from service.assets.measured.adaptive import parse_adaptive
+from service.document import parse_scene
+from service.formats import AssetLimits, MeasuredData
+from service.formats.read.measured import merl
+from service.formats.read.measured.adaptive import parse_adaptive
 from service.pack import pack
-from service.scene import parse_scene
 from tests import measured_files
 from tests.lobes import Grid
 from tests.measured_files import Facets

@@ -14,9 +14,9 @@ from gpu.kernels.flag_table import FLAGS
 from gpu.layout.bindings import Slot
 from gpu.layout.microfacet_records import PLAIN, Distribution
 from gpu.tables import microfacet as tables
+from service.document import parse_scene
+from service.document.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from service.pack import pack_materials, pack_microfacets
-from service.scene import parse_scene
-from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from tests import microfacets, stats
 from tests.families import EXACT
 from tests.lobes import Grid

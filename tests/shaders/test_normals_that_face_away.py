@@ -11,8 +11,8 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from gpu.kernels.source import SHADERS
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rays import ball_mesh
 from tests.rendering import Images, document
 

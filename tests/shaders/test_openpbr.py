@@ -14,8 +14,8 @@ from gpu import Renderer
 from gpu.layout.bindings import Slot
 from gpu.layout.models import NUMBERS
 from service.config import Config
+from service.document import parse_scene
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests import film
 from tests.probing import OPENPBR_FLAGS, PRINCIPLED_FLAGS, Prober, materials, openpbr, prober_of, rare
 from tests.rendering import document

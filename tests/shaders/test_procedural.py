@@ -12,9 +12,9 @@ from gpu import Renderer, RenderSettings
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS
 from gpu.layout.bindings import Slot
+from service.document import parse_scene
 from service.pack import pack
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests.documents import Few
 from tests.probing import PROBES
 from tests.rendering import Images, document, render

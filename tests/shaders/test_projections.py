@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.document import parse_scene
+from service.document.transform import Transform
 from service.pack import pack
 from service.problems import InvalidDocument
-from service.scene import parse_scene
-from service.scene.transform import Transform
 from tests.documents import Few
 from tests.extremes.scenes import icosphere
 from tests.normal_maps import facing

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rays import ball_mesh, to_world, trace
 from tests.rendering import Images, document
 

@@ -12,10 +12,10 @@ from gpu import Renderer
 from gpu.layout import LightKind, Uniforms
 from gpu.layout.bindings import Slot
 from gpu.tables import alias_table, sky
+from service.document import parse_scene
 from service.pack import pack
 from service.pack.edits.cache import PackCache
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests import stats
 from tests.marks import BY_ESTIMATOR
 from tests.probing import Prober, prober_of

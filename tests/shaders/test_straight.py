@@ -13,8 +13,8 @@ import pytest
 
 from gpu import Renderer
 from gpu.kernels.features import flags
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.extremes.scenes import ball
 from tests.marks import BY_ESTIMATOR, seldom
 from tests.rendering import Images, assert_estimators_agree, document, render

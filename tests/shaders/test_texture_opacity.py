@@ -10,8 +10,8 @@ import pytest
 from gpu import Renderer, RenderSettings, SceneEdit
 from gpu.arrays import SceneArrays
 from gpu.kernels import features
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 from tests.rendering import Images, document
 
 RNG = np.random.default_rng(9)

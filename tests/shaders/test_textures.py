@@ -15,10 +15,10 @@ from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
 from gpu.layout import texture_records
 from gpu.layout.bindings import Slot
+from service.document import parse_scene
 from service.pack import pack, parameter_edit
 from service.problems import InvalidDocument
-from service.scene import parse_scene
-from service.streams.scene_diff import SceneDiff, scene_diff
+from service.server.streams.scene_diff import SceneDiff, scene_diff
 from tests.documents import Few
 from tests.probing import PROBES
 from tests.rendering import Images, document, render
@@ -98,7 +98,7 @@ class Shelf(Images):
     """With one mesh that has two sets of coordinates."""
 
     def mesh(self, ref: str) -> Any:
-        from service.assets import MeshData
+        from service.formats import MeshData
 
         corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
         uvs = ((corners[:, :2] + 1) / 2).astype(np.float32)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gpu import Renderer, RenderSettings
+from service.document import parse_scene
 from service.pack import pack
 from service.pack.geometry import scene_bvh
-from service.scene import parse_scene
 from tests.documents import Shelf, box, document, mesh, quad, sphere
 
 

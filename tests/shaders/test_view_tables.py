@@ -9,7 +9,7 @@ from gpu import Lut, Picture, Renderer
 from gpu.picture.display import srgb
 from service import displays
 from service.colorimetry import decode_srgb
-from service.images import icc
+from service.formats.images import icc
 from service.worker.view import view_tables
 from tests.rendering import document, picture
 

@@ -18,7 +18,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, ViewportSize, sync_playwright
 
 from gpu import Renderer
-from service.storage.documents import KINDS
+from service.server.storage.documents import KINDS
 from tests.serving import Server
 from tests.web.editor import PATIENCE_S, Editor
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from starlette.responses import Response
 
-from service.cli import main
-from service.routes.errors import Files
+from service.cli.program import main
+from service.server.routes.errors import Files
 
 _answer = Files.get_response
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from service.scene.transform import Transform
+from service.document.transform import Transform
 from tests.web.editing import document
 from tests.web.editor import Editor
 from tests.web.modules import call

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from service.scene.medium import Medium
+from service.document.medium import Medium
 from tests.web.editing import document
 from tests.web.editor import Editor
 from tests.web.modules import call

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from service import displays, images
-from service.scene.transform import Transform
+from service import displays
+from service.document.transform import Transform
+from service.formats import images
 from tests.web.modules import call
 
 

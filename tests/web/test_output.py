@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Download, Locator, Page, Route, WebSocketRoute
 
-from service.images import read_metadata
+from service.formats.images import read_metadata
 from tests.serving import Server
 from tests.web.editor import Editor
 

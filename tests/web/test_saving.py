@@ -13,7 +13,7 @@ import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
-from service.images import read_metadata
+from service.formats.images import read_metadata
 from tests.serving import Server
 from tests.web.conftest import WINDOW
 from tests.web.editing import TRIANGLE, document, finish, overlay

@@ -15,7 +15,7 @@ from sunbox.client import Picture, run
 from sunbox.errors import SunboxError, from_problem
 
 if TYPE_CHECKING:
-    from service.commands.local import LocalRenderer
+    from service.cli.local import LocalRenderer
 
 
 def render(scene: Any, **settings: Any) -> Picture:
@@ -26,8 +26,8 @@ def render(scene: Any, **settings: Any) -> Picture:
 
 
 async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
-    from service.commands.local import stop
-    from service.commands.tracing import Interrupt
+    from service.cli.local import stop
+    from service.cli.tracing import Interrupt
 
     document, folder = files.read_scene(scene)
     interrupt = Interrupt()
@@ -47,7 +47,7 @@ async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
 
 
 async def _on_gl_thread(call: Any) -> Any:
-    from service.commands.local import as_problem
+    from service.cli.local import as_problem
     from service.problems import ServiceError
 
     try:
@@ -66,14 +66,14 @@ def _thread() -> ThreadPoolExecutor:
 
 @cache
 def _renderer() -> LocalRenderer:
-    from service.commands.local import LocalRenderer
+    from service.cli.local import LocalRenderer
 
     return LocalRenderer()
 
 
 def _service() -> None:
     try:
-        import service.commands.local  # noqa: F401
+        import service.cli.local  # noqa: F401
     except ImportError as error:
         raise RuntimeError(
             "sunbox.render needs the package sunbox-server (pip install 'sunbox[local]'); sunbox.Client does not."

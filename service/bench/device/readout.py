@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from gpu import Renderer
-from service import images
 from service.bench.device import stage
 from service.bench.device.stage import Options, Row
+from service.formats import images
 from service.views import StreamFormat
 
 SCENE, SAMPLES = "cornell-boxes", 4

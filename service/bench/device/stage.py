@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from gpu import Picture, RenderSettings, SceneArrays
-from service import presets
 from service.bench import timing
 from service.bench.scenes import BenchAssets, mesh_on_plane
+from service.document import parse_scene, presets
 from service.pack import pack
-from service.scene import parse_scene
 
 RUNS = 3  # of which the median counts
 MESH = "mesh on a plane"  # 73 728 triangles, beside the built-in scenes

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
 from service.bench.seeds.stage import Document, Stage, sheet, shown
+from service.document import presets
 
 ROOMS = ("cornell-boxes", "cornell-spheres", "cornell-glossy", "cornell-open")
 SIZE = 384

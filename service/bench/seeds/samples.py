@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from service import presets
-from service.assets import ImageData, MeasuredData, MeshData
 from service.bench.scenes import BenchAssets
 from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
+from service.document import parse_scene, presets
+from service.formats import ImageData, MeasuredData, MeshData
 from service.pack import CUBE_FACES, pack
-from service.scene import parse_scene
 
 SIZE, ERROR_SIZE = 800, 128
 COUNTS = tuple(4**k for k in range(7))  # 1, 4, ... 4 096

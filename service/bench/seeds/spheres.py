@@ -14,8 +14,8 @@ from gpu import SceneArrays
 from gpu.accel import bvh
 from gpu.accel.sah import Split
 from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_KIND_SHIFT, LEAF_MAX_COUNT, TREELET_BIT, ShapeKind
-from service import presets
 from service.bench.seeds.stage import Document, Stage, sheet, shown
+from service.document import presets
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 8000, 10_000)
 WIDTH, HEIGHT, BOUNCES = 480, 272, 4

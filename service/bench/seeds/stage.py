@@ -11,12 +11,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings, SceneArrays
-from service.assets import Assets
 from service.bench import timing
 from service.bench.scenes import BenchAssets
 from service.colorimetry import encode_srgb
+from service.document import parse_scene
+from service.formats import Assets
 from service.pack import pack
-from service.scene import parse_scene
 
 Document = dict[str, Any]
 Key = TypeVar("Key", bound=Hashable)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from service.document.material.principled import index_of_specular, roughness_of_gloss
+from service.document.texture import ColorTexture, ScalarTexture
 from service.exports.gltf.builder import Tree
 from service.exports.gltf.material_writer import MaterialWriter
 from service.exports.gltf.textures import ALPHA, Plane
-from service.scene.material.principled import index_of_specular, roughness_of_gloss
-from service.scene.texture import ColorTexture, ScalarTexture
 
 WHITE = (1.0, 1.0, 1.0)
 FILM_WEIGHT = "thin_film_weight"  # of models whose films cover a part, which glTF has as well

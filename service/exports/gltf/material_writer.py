@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from service.document.texture import ColorTexture, NormalTexture, ScalarTexture
 from service.exports.gltf.builder import Tree
 from service.exports.gltf.textures import ALPHA, Plane, Textures
 from service.problems import escaped
-from service.scene.texture import ColorTexture, NormalTexture, ScalarTexture
 
 COLORS = ("base_color", "albedo", "diffuse")  # names of a model's colour
 

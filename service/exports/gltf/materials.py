@@ -6,6 +6,10 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TypeGuard
 
+from service.document import Scene
+from service.document.material import DiffuseMaterial, Material, PrincipledMaterial
+from service.document.material.surface import AnySurface
+from service.document.texture import ColorTexture, ScalarTexture
 from service.exports.gltf import extensions
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.gltf.material_writer import Asked, MaterialWriter
@@ -13,10 +17,6 @@ from service.exports.gltf.textures import Plane, Textures
 from service.exports.losses import Losses
 from service.exports.principled import as_principled
 from service.problems import escaped
-from service.scene import Scene
-from service.scene.material import DiffuseMaterial, Material, PrincipledMaterial
-from service.scene.material.surface import AnySurface
-from service.scene.texture import ColorTexture, ScalarTexture
 
 BLACK = (0.0, 0.0, 0.0)
 

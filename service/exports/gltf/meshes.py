@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from service.assets import MeshData
-from service.assets.readers.raw_mesh import ROUNDING
-from service.assets.types import Floats
+from service.document.shape import MeshShape
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.gltf.tessellated import Tessellated
 from service.exports.losses import Losses
 from service.exports.writing import Files, Limits
+from service.formats import MeshData
+from service.formats.read.raw_mesh import ROUNDING
+from service.formats.types import Floats
 from service.pack.geometry.meshes import PlacedMesh, place
 from service.pack.geometry.vertex_normals import corner_normals, encode, split
 from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene.shape import MeshShape
 
 COMPUTED = {"extras": {"sunbox": {"normals": "computed"}}}  # our importer computes them again, to the bit
 CHECKED = 200_000  # vertices up to which it is tried whether rounding them changes the picture

@@ -6,9 +6,9 @@ import io
 
 import numpy as np
 
-from service.assets import ImageData
-from service.assets.types import Floats
 from service.colorimetry import decode_srgb, encode_srgb
+from service.formats import ImageData
+from service.formats.types import Floats
 
 CHECKER = 256  # texels along a side of a painted checker, whose period is two squares
 _LINEAR = decode_srgb(np.arange(256) / 255).astype(np.float32)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.types import Doubles
+from service.document import Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera, Scene
+from service.document.light import DirectionalLight, Light, SpotLight
+from service.document.named import Named
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
-from service.scene import Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera, Scene
-from service.scene.light import DirectionalLight, Light, SpotLight
-from service.scene.named import Named
+from service.formats.types import Doubles
 
 SHEARED = 1e-7  # cosine between axes of a matrix from which on it is no translation, rotation and scale
 NEAR = 1e-3  # of the distance to the target: where a rasteriser begins to draw

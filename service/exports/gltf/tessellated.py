@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.assets.types import Doubles, Indices
+from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, SphereShape
+from service.formats.types import Doubles, Indices
 from service.pack.geometry.analytic import CUBE_CAPS, CUBE_FACES, across
-from service.scene.shape import BoxShape, CylinderShape, DiskShape, QuadShape, SphereShape
 
 AROUND, UPWARD = 96, 48  # steps of a sphere: its outline is off by at most 0.0006 of the radius
 RIM = 96  # steps of a disk and a cylinder

@@ -9,15 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from service.assets import ImageData
-from service.assets.formats import sniff
+from service.document import Scene
+from service.document.texture import (
+    CheckerTexture,
+    ColorTexture,
+    ImageTexture,
+    NormalTexture,
+    Reference,
+    is_projected,
+)
 from service.exports.gltf import pixels
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
 from service.exports.writing import Files, Limits
+from service.formats import ImageData
+from service.formats.formats import sniff
 from service.problems import AssetError, FieldError, InvalidDocument, TooLarge, escaped
-from service.scene import Scene
-from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, Reference, is_projected
 
 WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
 LINEAR, MIPMAPS = 9729, 9987  # filters: between texels, and between levels as well

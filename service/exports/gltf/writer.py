@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from service.document import Scene
+from service.document.shape import MeshShape, Shape, SphereShape
+from service.document.texture import references
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.gltf.material_writer import Asked
 from service.exports.gltf.materials import Materials
@@ -14,9 +17,6 @@ from service.exports.gltf.textures import Textures
 from service.exports.losses import Losses
 from service.exports.writing import Exported, Files, Limits
 from service.problems import escaped
-from service.scene import Scene
-from service.scene.shape import MeshShape, Shape, SphereShape
-from service.scene.texture import references
 
 HOW = {
     "sphere": "the sphere is written as {count} triangles",

@@ -8,12 +8,8 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
-from service.assets.formats import sniff
-from service.exports.losses import Losses
-from service.exports.writing import Files
-from service.problems import AssetError, FieldError, InvalidDocument, escaped
-from service.scene import Scene
-from service.scene.texture import (
+from service.document import Scene
+from service.document.texture import (
     CheckerTexture,
     ColorTexture,
     ImageTexture,
@@ -21,6 +17,10 @@ from service.scene.texture import (
     ScalarTexture,
     is_projected,
 )
+from service.exports.losses import Losses
+from service.exports.writing import Files
+from service.formats.formats import sniff
+from service.problems import AssetError, FieldError, InvalidDocument, escaped
 
 WRAPS = {"repeat": "periodic", "clamp": "clamp", "mirror": "mirror"}
 SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}

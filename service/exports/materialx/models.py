@@ -1,15 +1,15 @@
 """`principled` as standard_surface and `openpbr` as open_pbr_surface: the inputs of each, which
-`service/assets/materialx/models.py` reads again."""
+`service/formats/read/materialx/models.py` reads again."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from service.document.material import OpenpbrMaterial, PrincipledMaterial
+from service.document.material.principled import index_of_specular, roughness_of_gloss
+from service.document.texture import ColorTexture, NormalTexture, ScalarTexture
 from service.exports.materialx.graph import WHITE, Graph, Value, color, number, switch
-from service.scene.material import OpenpbrMaterial, PrincipledMaterial
-from service.scene.material.principled import index_of_specular, roughness_of_gloss
-from service.scene.texture import ColorTexture, NormalTexture, ScalarTexture
 
 Inputs = dict[str, Value]
 STRETCH = 0.9  # of principled's anisotropy: alpha across the tangent is 1 - 0.9 a times that along it

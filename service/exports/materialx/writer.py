@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from service.document import Scene
+from service.document.material import OpenpbrMaterial
 from service.exports.losses import Losses
 from service.exports.materialx.graph import Graph, Images, valid
 from service.exports.materialx.models import open_pbr_surface, standard_surface
 from service.exports.principled import as_principled
 from service.exports.writing import Exported, Files, Limits, check_size
 from service.problems import escaped
-from service.scene import Scene
-from service.scene.material import OpenpbrMaterial
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39" colorspace="lin_rec709">\n'
 

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from service.document.shape import MeshShape, Shape
 from service.pack.edits.moved_meshes import MESH_FIELDS, MovedMeshes
-from service.scene.shape import MeshShape, Shape
 
 T = TypeVar("T")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 
 from gpu.arrays import HEAVY
-from service.scene.shape import MeshShape, Shape
+from service.document.shape import MeshShape, Shape
 
 # The fields of a mesh that its triangles depend on.
 MESH_FIELDS = tuple(name for name in MeshShape.model_fields if name not in ("name", "medium", "priority"))

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gpu import layout
+from service.document.numbers import LARGEST
 from service.problems import FieldError, InvalidDocument
-from service.scene.numbers import LARGEST
 
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w

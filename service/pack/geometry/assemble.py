@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gpu.layout import ShapeKind
-from service.assets import Assets
+from service.document.shape import Shape
+from service.formats import Assets
 from service.pack.geometry import instances, meshes, scene_bvh
 from service.pack.geometry.geometry import Geometry, MeshExtents
 from service.pack.geometry.meshes import Triangles
@@ -22,7 +23,6 @@ from service.pack.geometry.triangle_buffers import write_triangles
 from service.pack.geometry.warnings import counted
 from service.pack.geometry.world import ShapeMaterials, World, place
 from service.pack.parameters import vec3
-from service.scene.shape import Shape
 from service.system.shared_memory import LEAST, SharedArena, trim
 
 MANY = 100_000  # triangles from which on packing returns its freed memory to the system

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from gpu.layout import Body
+from service.document import Scene
+from service.document.medium import LARGEST_G, Medium
+from service.document.shape import CylinderShape
 from service.pack.geometry.warnings import OddMesh, counted
-from service.scene import Scene
-from service.scene.medium import LARGEST_G, Medium
-from service.scene.shape import CylinderShape
 
 
 def bodies(scene: Scene) -> np.ndarray:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.assets import MeshData
-from service.assets.types import array_bytes
+from service.formats import MeshData
+from service.formats.types import array_bytes
 from service.pack.geometry.subdivision import TooManyTriangles, moved, subdivided
 from service.pack.geometry.vertex_normals import corner_normals, same, split
 from service.pack.textures.heights import HeightField

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu.layout import ShapeKind
+from service.document.numbers import Vec3
 from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.triangle_buffers import TriangleBuffers
 from service.pack.geometry.warnings import OddMesh
-from service.scene.numbers import Vec3
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SHAREABLE
-from service.assets import MeshData
+from service.document.shape import MeshShape
+from service.formats import MeshData
 from service.pack.geometry.shared_meshes import MOST_SEEN, SharedMesh, shift
 from service.pack.textures.uses import RequiredCharts
 from service.problems import FieldError, InvalidDocument
-from service.scene.shape import MeshShape
 
 LEAST = SHAREABLE  # triangles of a mesh
 WORTH = 1 << 17  # triangles that sharing must save a scene: 26 MB, in exchange for slower walks through two levels

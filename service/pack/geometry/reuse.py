@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gpu.layout import ShapeKind
+from service.document.shape import Shape
 from service.pack.geometry import scene_bvh
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.rebase import rebase
@@ -16,7 +17,6 @@ from service.pack.geometry.shape_records import area_lights, hide
 from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.world import ShapeMaterials, World, place_analytic
 from service.pack.parameters import vec3
-from service.scene.shape import Shape
 
 
 @dataclass(frozen=True)

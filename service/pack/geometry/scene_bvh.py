@@ -8,11 +8,11 @@ import numpy as np
 
 from gpu import SceneTooLarge
 from gpu.layout import Node, ShapeKind
+from service.document.numbers import Vec3
 from service.pack.geometry.parallel import chunks, in_threads
 from service.pack.geometry.records import Bounds
 from service.pack.geometry.vertex_normals import corner_normals
 from service.problems import FieldError, InvalidDocument
-from service.scene.numbers import Vec3
 
 # A kind with more shapes than this goes through the tree; the loop over fewer costs less than the walk.
 LINEAR = {

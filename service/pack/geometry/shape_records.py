@@ -8,9 +8,9 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
+from service.document.shape import Shape
 from service.pack.geometry.world import ShapeMaterials
 from service.pack.lights import lights
-from service.scene.shape import Shape
 
 
 def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
+from service.document.numbers import Vec3
 from service.pack.geometry.meshes import PlacedMesh, Triangles, survey
-from service.scene.numbers import Vec3
 
 PARTS = 128  # boxes that stand for a model when a box around it under a transform is computed
 

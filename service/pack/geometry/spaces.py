@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gpu.layout import ShapeSpace
-from service.scene import Scene
-from service.scene.numbers import Vec3
-from service.scene.procedural import NoiseTexture, RampInput, RampTexture
-from service.scene.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
-from service.scene.texture import is_projected, references
+from service.document import Scene
+from service.document.numbers import Vec3
+from service.document.procedural import NoiseTexture, RampInput, RampTexture
+from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
+from service.document.texture import is_projected, references
 
 
 def shape_spaces(scene: Scene, origin: Vec3) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu import layout
-from service.assets import MeshOddities
+from service.formats import MeshOddities
 
 NUMBER = re.compile(r"\d+")
 

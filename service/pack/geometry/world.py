@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gpu import SceneTooLarge
-from service.assets import Assets, MeshData, MeshOddities
-from service.assets.readers.mesh_checks import mesh_oddities
+from service.document.numbers import LARGEST
+from service.document.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
+from service.formats import Assets, MeshData, MeshOddities
+from service.formats.read.mesh_checks import mesh_oddities
 from service.pack.geometry import instances, meshes
 from service.pack.geometry.analytic import AnalyticShapes, check_reach
 from service.pack.geometry.displacement import Displacement, displaced
@@ -20,8 +22,6 @@ from service.pack.geometry.warnings import OddMesh
 from service.pack.textures.heights import HeightField
 from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene.numbers import LARGEST
-from service.scene.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
 from service.system.memory import takes
 
 WITHOUT = "; an image or a checker needs none with mapping 'box' or 'sphere'"

@@ -11,12 +11,8 @@ import numpy as np
 
 from gpu.tables.alias_table import LUMINANCE, cube_solid_angles, cube_tables, environment_tables, solid_angles
 from gpu.tables.sky import SunDisk, bake, sun_disk
-from service.assets import Assets, ImageData
-from service.pack.edits.cache import lasting
-from service.pack.lights.environment_blur import blur_cube, blur_image
-from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene.color import LINEAR_OF_BYTE
-from service.scene.environment import (
+from service.document.color import LINEAR_OF_BYTE
+from service.document.environment import (
     ConstantEnvironment,
     CubeFaces,
     CubemapEnvironment,
@@ -24,7 +20,11 @@ from service.scene.environment import (
     ImageEnvironment,
     SkyEnvironment,
 )
-from service.scene.numbers import BRIGHTEST
+from service.document.numbers import BRIGHTEST
+from service.formats import Assets, ImageData
+from service.pack.edits.cache import lasting
+from service.pack.lights.environment_blur import blur_cube, blur_image
+from service.problems import AssetError, FieldError, InvalidDocument
 from service.system.memory import takes
 from service.system.shared_memory import SharedArena
 

@@ -10,7 +10,7 @@ import numpy as np
 from gpu import layout
 from gpu.layout import LightKind, ShapeKind
 from gpu.tables.alias_table import LUMINANCE, alias_table
-from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
+from service.document.light import DirectionalLight, Light, PointLight, SpotLight
 
 SHINING = {
     ShapeKind.SPHERE: LightKind.SPHERE,

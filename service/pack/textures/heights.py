@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from service.assets import Assets, ImageData
 from service.colorimetry import decode_srgb
+from service.document import Scene
+from service.document.color import LINEAR_OF_BYTE
+from service.document.shape import MeshShape
+from service.document.texture import CheckerTexture, HeightTexture, ImageTexture, is_projected
+from service.formats import Assets, ImageData
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
-from service.scene import Scene
-from service.scene.color import LINEAR_OF_BYTE
-from service.scene.shape import MeshShape
-from service.scene.texture import CheckerTexture, HeightTexture, ImageTexture, is_projected
 
 CHUNK = 1 << 18  # coordinates at a time, which bounds the memory that they take
 LINEAR = np.array(LINEAR_OF_BYTE)

@@ -11,15 +11,15 @@ from typing import Protocol
 import numpy as np
 
 from gpu.layout.texture_records import Texels, level_texels
-from service.assets import Assets, ImageData
 from service.colorimetry import decode_srgb
+from service.document import Scene
+from service.document.texture import (
+    ImageTexture,
+)
+from service.formats import Assets, ImageData
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
-from service.scene import Scene
-from service.scene.texture import (
-    ImageTexture,
-)
 from service.system.memory import takes
 
 MAX_TEXELS = 2**27  # the texels of a texture of 16384 rows on the device

@@ -8,9 +8,9 @@ import numpy as np
 
 from gpu.layout import texture_records
 from gpu.layout.texture_records import TextureRecipe
+from service.document.procedural import NoiseTexture, RampInput, RampTexture
+from service.document.texture import CheckerTexture
 from service.pack.textures.uses import TextureReference
-from service.scene.procedural import NoiseTexture, RampInput, RampTexture
-from service.scene.texture import CheckerTexture
 
 EVEN = 65  # places along a ramp at which its colours are counted
 

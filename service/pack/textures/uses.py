@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 
 from gpu.layout import texture_records
 from gpu.layout.texture_records import Texels
-from service.assets import ImageData
-from service.pack.parameters import member_of
-from service.problems import FieldError, InvalidDocument, escaped
-from service.scene import Scene
-from service.scene.material import Material, MicrofacetMaterial, stretches
-from service.scene.procedural import NoiseTexture, RampInput, RampTexture
-from service.scene.shape import MeshShape
-from service.scene.texture import (
+from service.document import Scene
+from service.document.material import Material, MicrofacetMaterial, stretches
+from service.document.procedural import NoiseTexture, RampInput, RampTexture
+from service.document.shape import MeshShape
+from service.document.texture import (
     CheckerTexture,
     ColorTexture,
     HeightTexture,
@@ -25,6 +22,9 @@ from service.scene.texture import (
     is_projected,
     references,
 )
+from service.formats import ImageData
+from service.pack.parameters import member_of
+from service.problems import FieldError, InvalidDocument, escaped
 
 # Appended to the reference of an asset whose texels, or whose mip levels, are not those that stand under it alone.
 DECODED = " decoded"  # sRGB floats that were made linear

@@ -10,17 +10,10 @@ import numpy as np
 from gpu import TextureArrays
 from gpu.layout import texture_records
 from gpu.layout.texture_records import Texels
-from service.assets import Assets, ImageData
-from service.pack.edits.cache import PackCache, lasting
-from service.pack.parameters import member_of
-from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
-from service.pack.textures.recipes import listed, recipe_flags, recipe_words, room_for_stops
-from service.pack.textures.uses import TextureReference, check_channels, sampled, uses_of
-from service.problems import escaped
-from service.scene import Scene
-from service.scene.color import LINEAR_OF_BYTE
-from service.scene.procedural import NoiseTexture
-from service.scene.texture import (
+from service.document import Scene
+from service.document.color import LINEAR_OF_BYTE
+from service.document.procedural import NoiseTexture
+from service.document.texture import (
     CheckerTexture,
     ColorTexture,
     HeightTexture,
@@ -30,6 +23,13 @@ from service.scene.texture import (
     ScalarTexture,
     is_projected,
 )
+from service.formats import Assets, ImageData
+from service.pack.edits.cache import PackCache, lasting
+from service.pack.parameters import member_of
+from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
+from service.pack.textures.recipes import listed, recipe_flags, recipe_words, room_for_stops
+from service.pack.textures.uses import TextureReference, check_channels, sampled, uses_of
+from service.problems import escaped
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
 

@@ -20,9 +20,9 @@ from typing import Any, Literal, Protocol
 from service.config import Ahead
 from service.ipc import channel, heartbeat
 from service.ipc.server_end import Channel
-from service.logs import setup
 from service.system.child_processes import inherited_environment
 from service.system.cpu_time import RunnableTime
+from service.system.logs import setup
 
 ROOT = Path(__file__).parents[3]
 TURNS = 10  # how many times as long as the last one a piece of work may take, beyond the patience

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from service.ipc import channel
-from service.logs import setup
 from service.renderers.local.process import ROOT, Start, Waiting
 from service.renderers.ray import control
 from service.renderers.ray.control import Join, Joined, Open, Refused, Release
@@ -26,6 +25,7 @@ from service.renderers.ray.process import ClusterProcess
 from service.renderers.ray.renderers import described
 from service.system.child_processes import inherited_environment
 from service.system.executors import tending
+from service.system.logs import setup
 
 JOIN_S = 80.0  # for the gateway to start and to join, which it gives up itself much earlier
 SILENT_S = 20.0  # without a sign of life, one of which comes every second

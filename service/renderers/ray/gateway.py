@@ -19,7 +19,6 @@ from contextlib import suppress
 from typing import Any
 
 from service.ipc import channel
-from service.logs import setup
 from service.renderers.local.process import Waiting
 from service.renderers.ray import control
 from service.renderers.ray.actor import Renderer
@@ -29,6 +28,7 @@ from service.renderers.ray.joining import CannotJoin, close_token_file, has_toke
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described
 from service.system.background import Background
+from service.system.logs import setup
 
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"

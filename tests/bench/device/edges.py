@@ -8,10 +8,10 @@ import numpy as np
 import trimesh
 
 from gpu import Renderer
-from service.assets import MeshData
 from service.bench.device import stage
+from service.document import parse_scene
+from service.formats import MeshData
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench.device.part import Options, Row
 from tests.rendering import Images
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from gpu import SceneArrays
-from service import presets
 from service.bench.device import stage
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.pack import pack
-from service.scene import parse_scene
 
 BALL = "shader-ball"
 MATERIALS = ("gold", "glass", "car-paint", "skin", "soap-film", "marble", "milk", "velvet", "anodised-titanium")

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from gpu import SceneArrays
-from service import presets
-from service.assets import Assets, MeshData
 from service.bench.scenes import BenchAssets, cases, mesh_on_plane, standing
 from service.bench.tradeoff_scenes import BUMPS, PLANKS, TradeoffAssets
+from service.document import parse_scene, presets
+from service.formats import Assets, MeshData
 from service.pack import pack
-from service.scene import parse_scene
 from tests.bench import peer_scenes
 
 Document = dict[str, Any]

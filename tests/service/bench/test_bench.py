@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from service.bench import growth, latency, machine, scenes, speed, timing
-from service.cli import main
+from service.cli.program import main
+from service.document import parse_scene
 from service.pack import pack
-from service.scene import parse_scene
 
 
 @pytest.mark.parametrize("case", scenes.cases(), ids=lambda case: f"{case.name}-{case.max_bounces}")

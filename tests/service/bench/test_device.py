@@ -17,7 +17,7 @@ from gpu import Renderer
 from gpu.analysis.slices import slices_of
 from service.bench.device import caustics, dispatches, frames, isolated, kernels, run, stage, table, trees
 from service.bench.device.report import Report
-from service.cli import main
+from service.cli.program import main
 
 TINY = stage.Options(seconds=1.0, sizes=((32, 24),), scenes=("cornell-boxes",))
 

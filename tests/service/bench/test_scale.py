@@ -12,7 +12,7 @@ import pytest
 
 from service.bench import scale, scale_report
 from service.bench.scale_model import BLOCK, Costs, Network, Work, limits, simulate, speedup, steady_speedup
-from service.cli import main
+from service.cli.program import main
 from service.worker.division.home import EACH
 from tests.marks import seldom
 

@@ -15,7 +15,7 @@ from gpu import Renderer
 from gpu.analysis.unbounded import UnboundedRenderer
 from service.bench.seeds import blur, bounces, reflection, report, run, samples, spheres
 from service.bench.seeds.stage import GAP, Stage, sheet, shown
-from service.cli import main
+from service.cli.program import main
 
 
 @pytest.fixture

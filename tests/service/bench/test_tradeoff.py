@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import quality
 from service.bench import pareto, tradeoff, tradeoff_report
 from service.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
-from service.cli import main
+from service.cli.program import main
+from service.document import parse_scene, quality
 from service.pack import pack
-from service.scene import parse_scene
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from service.cli import main
+from service.cli.program import main
 from sunbox import Client
 from tests.calls import is_problem
 from tests.serving import Server

@@ -14,13 +14,12 @@ import pytest
 import trimesh
 
 from gpu import Renderer, RenderSettings
-from service import presets
-from service.assets import AssetStore
 from service.config import Config
+from service.document import parse_scene, presets
 from service.exports import FORMATS, Exported, Losses
 from service.pack import pack
 from service.problems import InvalidDocument, TooLarge
-from service.scene import parse_scene
+from service.server.assets import AssetStore
 from tests.asset_files import png
 
 CONFIG = Config()

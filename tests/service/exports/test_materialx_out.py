@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets import AssetStore
-from service.assets.materialx.importer import read_materialx
-from service.assets.types import AssetLimits, SceneFile
-from service.cli import main
+from service.cli.program import main
 from service.config import Config
+from service.document import parse_scene
 from service.exports import FORMATS, Exported
-from service.scene import parse_scene
+from service.formats.read.materialx.importer import read_materialx
+from service.formats.types import AssetLimits, SceneFile
+from service.server.assets import AssetStore
 from tests.asset_files import png
 from tests.serving import Server
 

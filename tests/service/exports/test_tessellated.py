@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from service.document.shape import CylinderShape
 from service.exports.gltf.tessellated import tessellated
-from service.scene.shape import CylinderShape
 
 
 @pytest.mark.parametrize("caps", [True, False])

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from service.document import Scene, parse_scene
 from service.pack import pack
 from service.pack.edits.cache import PackCache
 from service.pack.geometry import displacement
 from service.problems import InvalidDocument
-from service.scene import Scene, parse_scene
-from service.streams.scene_diff import scene_diff
+from service.server.streams.scene_diff import scene_diff
 from tests.documents import CUBE, Few, Shelf, document, mesh, picture, refused
 
 N = 16

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.document import parse_scene
 from service.pack import pack
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.extremes.scenes import ball, icosphere
 

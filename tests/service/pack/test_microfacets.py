@@ -10,10 +10,10 @@ import pytest
 
 from gpu.layout.microfacet_records import TERMS, Microfacet
 from gpu.tables.microfacet import INTERVALS, ROWS
+from service.document import parse_scene
+from service.document.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from service.pack import pack, pack_materials, pack_microfacets
 from service.problems import InvalidDocument
-from service.scene import parse_scene
-from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from tests.documents import Shelf
 
 Doc = dict[str, Any]

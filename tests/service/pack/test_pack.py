@@ -10,9 +10,9 @@ import pytest
 
 from gpu import layout
 from gpu.layout.models import NUMBERS
+from service.document import parse_scene
 from service.pack import CacheBudget, PackCache, pack_camera, pack_materials
 from service.problems import InvalidDocument
-from service.scene import parse_scene
 from tests.documents import (
     CAMERA,
     LAMP,
@@ -378,7 +378,7 @@ def test_small_scenes_load_no_compiler():
 import sys
 from tests.counting import python_lines
 from service.pack import pack
-from service.scene import parse_scene
+from service.document import parse_scene
 scene = parse_scene({"version": 1, "camera": {"position": [0, 0, 5], "target": [0, 0, 0]},
     "environment": {"type": "constant", "radiance": 1}, "materials": {"a": {"type": "diffuse", "albedo": 0.5}},
     "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "a"}]})

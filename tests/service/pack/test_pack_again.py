@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.document import parse_scene
 from service.pack import PackCache, pack
 from service.pack.geometry import assemble, scene_bvh
-from service.scene import parse_scene
 from tests.rendering import Images, document
 
 

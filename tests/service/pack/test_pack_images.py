@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gpu.layout import texture_records
-from service.assets import ImageData
+from service.document import parse_scene
+from service.formats import ImageData
 from service.pack import pack
 from service.problems import AssetError, InvalidDocument
-from service.scene import parse_scene
 from tests.rendering import Images, document
 
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m0"}

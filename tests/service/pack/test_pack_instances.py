@@ -9,10 +9,10 @@ import pytest
 
 from gpu import scene_bytes
 from gpu.layout import ShapeKind
-from service.assets import MeshData
+from service.document import parse_scene
+from service.formats import MeshData
 from service.pack import PackCache, pack
 from service.pack.geometry import instances
-from service.scene import parse_scene
 from tests.documents import MIRRORED, Few, Shelf, document, matrix_of, mesh, packed, refused, sphere
 from tests.extremes.scenes import icosphere
 

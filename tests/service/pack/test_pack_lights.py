@@ -323,7 +323,7 @@ WARMED = """
 from numba.core.registry import CPUDispatcher
 from gpu.accel import light_tree, light_tree_build, light_tree_clusters
 from service.pack import pack, warm_light_tree
-from service.scene import parse_scene
+from service.document import parse_scene
 def compiled():
     modules = (light_tree, light_tree_build, light_tree_clusters)
     found = [each for module in modules for each in vars(module).values() if isinstance(each, CPUDispatcher)]

@@ -11,12 +11,13 @@ import pytest
 from gpu import Renderer, layout
 from gpu.kernels.features import flags
 from gpu.layout.bindings import Slot
-from service.assets import AssetStore, MeshData
+from service.document import parse_scene
+from service.formats import MeshData
 from service.pack import pack
 from service.pack.geometry.tangents import codes
 from service.pack.geometry.vertex_normals import decode
-from service.scene import parse_scene
-from service.streams.scene_diff import scene_diff
+from service.server.assets import AssetStore
+from service.server.streams.scene_diff import scene_diff
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
 from tests.normal_maps import MAPS, TEXTURES

@@ -7,15 +7,15 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from service.config import Config
+from service.document import parse_scene, parse_settings
+from service.document.quality import resolve
 from service.ipc import channel
 from service.ipc.messages import Done, Progress, Ready, Restore, SavedPicture, Unable, Update
 from service.pack import Packed, pack
 from service.problems import Unavailable
-from service.quality import resolve
 from service.renderers.local.process import Cause
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.statistics import Statistics
-from service.scene import parse_scene, parse_settings
 from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE
 

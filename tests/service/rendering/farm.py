@@ -11,7 +11,7 @@ import numpy as np
 from service.ipc.messages import Checkpoint, Done, Image, Progress, Read, Reason, Restore, SavedPicture, Update
 from service.ipc.task_control import Stop, TakeCheckpoint
 from service.problems import Unavailable
-from service.renders.store.store import RenderStore
+from service.server.renders.store.store import RenderStore
 from tests.service.rendering.fakes import Renderers
 
 

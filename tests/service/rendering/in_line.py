@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from service.renders.slots import Slots
+from service.server.renders.slots import Slots
 
 
 class Fake:

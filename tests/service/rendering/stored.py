@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from service.document import parse_settings
+from service.document.quality import resolve
 from service.ipc.messages import Progress, Restore, SavedPicture
-from service.quality import resolve
-from service.renders.store.record import Order
-from service.scene import parse_settings
+from service.server.renders.store.record import Order
 
 SETTINGS = resolve(parse_settings({"width": 4, "height": 4}, "", None))
 PROGRESS = Progress(8, 0.25, 1.5, None)

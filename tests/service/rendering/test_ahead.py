@@ -11,11 +11,11 @@ import pytest
 
 from gpu import KernelKey, Renderer
 from gpu.precompile.kernel_keys import common_keys
-from service import app
 from service.config import Ahead, ConfigError, load_config
 from service.ipc.messages import Done, StopRule, Update
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.pool.devices import seats
+from service.server import app
 from service.worker.foreseen import ForeseenKernels
 from service.worker.helpers.compile_client import CompileClient
 from tests.serving import AHEAD

@@ -10,26 +10,26 @@ from typing import Any, cast
 
 import pytest
 
-from service.assets import Assets
-from service.batches import queue as batch_queue
-from service.callbacks import queue as callback_queue
 from service.config import Config
+from service.formats import Assets
 from service.ipc.messages import Checkpoint, Done, Progress, Progressed
-from service.operation.loading import Loading
 from service.problems import MISTAKE, Unavailable
 from service.renderers.local import keeper
 from service.renderers.local.supervisor import Supervisor
-from service.renders.job import Job
-from service.renders.recorder import Recorder
-from service.renders.slots import Slots
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.requests.request_reader import RequestReader
-from service.storage.asset_access import NO_USES
-from service.storage.callback_rows import CallbackRows, insert
-from service.storage.database import Database
-from service.streams.sessions import Sessions
-from service.streams.stream import Stream
+from service.server.batches import queue as batch_queue
+from service.server.callbacks import queue as callback_queue
+from service.server.operation.loading import Loading
+from service.server.renders.job import Job
+from service.server.renders.recorder import Recorder
+from service.server.renders.slots import Slots
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.requests.request_reader import RequestReader
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.callback_rows import CallbackRows, insert
+from service.server.storage.database import Database
+from service.server.streams.sessions import Sessions
+from service.server.streams.stream import Stream
 from service.system import background
 from service.system.background import Background
 from tests.counting import in_simulated_time

@@ -13,19 +13,19 @@ from typing import Any
 
 import pytest
 
-from service.batches.batch import Batch, member_id
-from service.batches.members import Members as RealMembers
-from service.batches.queue import BatchQueue
 from service.config import MIB, Config
 from service.problems import MISTAKE, NotFound, TooLarge, TooManyRequests
-from service.renders.job import Job
-from service.renders.queue import RenderQueue
-from service.renders.store.batch_rows import BatchOrder
-from service.renders.store.record import Order, Outcome, StoredRender
-from service.renders.store.store import RenderStore
-from service.requests.request_parser import folded
-from service.requests.request_reader import RequestReader
-from service.storage.asset_access import NO_USES
+from service.server.batches.batch import Batch, member_id
+from service.server.batches.members import Members as RealMembers
+from service.server.batches.queue import BatchQueue
+from service.server.renders.job import Job
+from service.server.renders.queue import RenderQueue
+from service.server.renders.store.batch_rows import BatchOrder
+from service.server.renders.store.record import Order, Outcome, StoredRender
+from service.server.renders.store.store import RenderStore
+from service.server.requests.request_parser import folded
+from service.server.requests.request_reader import RequestReader
+from service.server.storage.asset_access import NO_USES
 from service.system.turns import CALLER
 from tests.documents import Shelf
 from tests.queues import LIMITS

@@ -14,13 +14,13 @@ import pytest
 
 from gpu import Renderer
 from gpu.precompile import kernel_keys
+from service.document import DiffuseMaterial, parse_scene
+from service.document.material.openpbr import OpenpbrMaterial
 from service.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
 from service.pack import pack, pack_material
 from service.problems import TooManyRequests
 from service.renderers.bsdf_questions import LONG_AT_ONCE, MOST, BsdfQuestions
 from service.renderers.local.supervisor import Supervisor
-from service.scene import DiffuseMaterial, parse_scene
-from service.scene.material.openpbr import OpenpbrMaterial
 from tests.documents import Shelf
 from tests.serving import SCENE
 from tests.supervisors import LINEAR, SIZE, Ears, Rendering, compile_helpers, with_supervisor

@@ -31,8 +31,8 @@ from service.ipc.messages import (
 )
 from service.ipc.task_control import CheckpointStored, Stop
 from service.renderers.local.supervisor import Supervisor
-from service.renders.recorder import Recorder
-from service.renders.store.store import RenderStore
+from service.server.renders.recorder import Recorder
+from service.server.renders.store.store import RenderStore
 from service.worker.device import checkpoints
 from tests.marks import seldom
 from tests.supervisors import LINEAR, Ears, Rendering, arrays_of, settings

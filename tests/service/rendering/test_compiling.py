@@ -17,6 +17,7 @@ from gpu.kernels.binaries import ENTRIES
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import KernelSource
 from gpu.precompile.kernel_keys import flags, kernel_key
+from service.document import DiffuseMaterial, parse_scene
 from service.ipc import channel, heartbeat
 from service.ipc.leases import Assist
 from service.ipc.messages import (
@@ -35,7 +36,6 @@ from service.ipc.messages import (
 )
 from service.ipc.task_control import Drop, Settle
 from service.pack import pack, pack_material
-from service.scene import DiffuseMaterial, parse_scene
 from service.worker.helpers.compile_client import records
 from service.worker.helpers.compile_lane import Compiled
 from service.worker.loop import Loop

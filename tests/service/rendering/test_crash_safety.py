@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from service.ipc.messages import Checkpoint, Done, Progress
-from service.renders.recorder import Recorder
-from service.renders.store.pictures import PictureFiles
-from service.renders.store.record import Outcome, StoredRender
-from service.renders.store.rows import RenderRows
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES
+from service.server.renders.recorder import Recorder
+from service.server.renders.store.pictures import PictureFiles
+from service.server.renders.store.record import Outcome, StoredRender
+from service.server.renders.store.rows import RenderRows
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES
 from tests.service.rendering.stored import DOCUMENT, order, picture
 
 HALF, WHOLE = Progress(8, 0.2, 1.0), Progress(64, 0.1, 4.0)

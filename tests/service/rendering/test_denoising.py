@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, denoise
-from service.cli import main
+from service.cli.program import main
 from service.ipc import channel, heartbeat
 from service.ipc.messages import Ready
 from service.renderers.local.supervisor import Supervisor

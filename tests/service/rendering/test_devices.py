@@ -15,13 +15,13 @@ import pytest
 
 from gpu import ContextError, Renderer, devices, egl, software_device
 from service import config as configs
-from service import launch
 from service.config import Config, ConfigError, load_config
 from service.ipc import channel
 from service.renderers.local import process
 from service.renderers.local.process import THREADS, Options
 from service.renderers.pool import devices as seating
 from service.renderers.pool.devices import NoDevices, missing_device, of_cuda, seats
+from service.server import launch
 from service.system.child_processes import inherited_environment
 from service.worker import list_devices
 from service.worker.helpers import compile_main

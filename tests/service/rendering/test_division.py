@@ -16,7 +16,7 @@ from gpu import Band, OutOfMemory, Renderer, RenderSettings, Saved, Steps, borde
 from gpu.picture.accumulators import Accumulators
 from service.ipc.leases import Lease, LeaseDone, LeaseRefuted
 from service.ipc.messages import Failed, Progress, Restore, StopRule, Update, driver_of
-from service.renders.store.pictures import PictureFiles
+from service.server.renders.store.pictures import PictureFiles
 from service.worker.context import WorkerContext
 from service.worker.division.assistant import Assistant
 from service.worker.division.home import Home

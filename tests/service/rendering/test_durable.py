@@ -18,13 +18,13 @@ import pytest
 
 from gpu import Renderer
 from service.config import MIB, Config
-from service.quality import resolve
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.requests.request_parser import folded
-from service.scene import parse_settings
-from service.storage.asset_access import NO_USES
-from service.storage.database import FILE
+from service.document import parse_settings
+from service.document.quality import resolve
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.requests.request_parser import folded
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.database import FILE
 from tests.serving import ENDLESS, KEYS, PATIENCE_S, SCENE, SMALL, Server, kill, wait_until
 
 LONG = {"width": 96, "height": 96, "max_samples": 500, "seed": 3}

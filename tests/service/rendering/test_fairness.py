@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from gpu import Renderer, SceneEdit
+from service.document import parse_scene
 from service.ipc.messages import FromRenderer, StopRule, Update
 from service.ipc.task_control import Pause
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.statistics import Kind
-from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
 from tests.supervisors import Rendering

@@ -10,13 +10,12 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from gpu.precompile.kernel_keys import common_keys
-from service import presets
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.ipc import channel
 from service.ipc.messages import Done, Frame, Loaded, Progress, StopRule, Update, View, Want
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.device.loaded_scene import KernelRequest
 from service.worker.helpers import first_look_client
 from service.worker.helpers.compile_client import CompileClient

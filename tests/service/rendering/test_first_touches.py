@@ -9,13 +9,13 @@ import pytest
 
 from gpu import KernelKey, RenderSettings, SceneArrays
 from gpu.precompile import fallback, kernel_keys
-from service import presets
 from service.bench.scenes import BenchAssets
 from service.config import Config
+from service.document import presets
 from service.ipc.messages import Update
-from service.requests.request_reader import RequestReader
-from service.streams import protocol
-from service.streams.edit_session import EditSession
+from service.server.requests.request_reader import RequestReader
+from service.server.streams import protocol
+from service.server.streams.edit_session import EditSession
 from service.worker.device.loaded_scene import EditedScene, KernelRequest, Offloaded, edited_scene, kernel_request
 from tests.bench.sliders import Slider, sliders
 from tests.marks import seldom

@@ -10,8 +10,8 @@ import pytest
 
 from service.ipc.messages import Frame, Progress, Want
 from service.problems import InvalidDocument
-from service.streams.flow_control import PATIENCE_S, FlowControl
-from service.streams.protocol import View
+from service.server.streams.flow_control import PATIENCE_S, FlowControl
+from service.server.streams.protocol import View
 from tests.counting import in_simulated_time
 
 PIXELS = np.zeros((1, 1, 4), np.uint8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, field
 
-from service.renders.followers import Changes, Followers
+from service.server.renders.followers import Changes, Followers
 
 
 @dataclass

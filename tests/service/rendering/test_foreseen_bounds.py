@@ -12,11 +12,10 @@ import pytest
 from gpu import KernelKey, RenderSettings
 from gpu.kernels import features
 from gpu.precompile import kernel_keys
-from service import presets
 from service.bench.scenes import BenchAssets
+from service.document import parse_scene, presets
 from service.ipc.messages import Foresee
 from service.pack import pack
-from service.scene import parse_scene
 from service.system import power
 from service.worker import foreseen
 from service.worker.device.loaded_scene import begin_key, slider_keys

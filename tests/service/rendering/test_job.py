@@ -26,11 +26,11 @@ from service.ipc.messages import (
 from service.ipc.task_control import Stop, TakeCheckpoint
 from service.pack import Packed
 from service.problems import Conflict, Internal
-from service.renders.job import Job
-from service.renders.recorder import MOST_STARTS, Recorder
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES
+from service.server.renders.job import Job
+from service.server.renders.recorder import MOST_STARTS, Recorder
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES
 from tests.service.rendering.fakes import SETTINGS, Renderers, load, until
 
 SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])

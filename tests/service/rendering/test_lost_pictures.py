@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from service import cli
+from service.cli import program as cli
 from service.config import Config
 from service.ipc.messages import Progress
 from service.problems import Unavailable
-from service.renders.store.pictures import PictureFiles
-from service.renders.store.record import Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES
-from service.storage.database import FILE
-from service.storage.lost_pictures import KEEP
-from service.storage.stores import storage
+from service.server.renders.store.pictures import PictureFiles
+from service.server.renders.store.record import Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.database import FILE
+from service.server.storage.lost_pictures import KEEP
+from service.server.storage.stores import storage
 from service.system.disk_usage import Usage
 from tests.service.rendering.stored import DOCUMENT, PROGRESS, order, picture
 

@@ -40,7 +40,12 @@ print(*found, os.getpriority(os.PRIO_PROCESS, 0))
 """
 SERVICE = Path(__file__).parents[3] / "service"
 # In the commands of processes; the last one is there where a kernel was new.
-WORKERS = ("service.worker\0", "service.requests.parser_child", "service.assets.sandbox.child", "--priority\0now")
+WORKERS = (
+    "service.worker\0",
+    "service.server.requests.parser_child",
+    "service.formats.sandbox.child",
+    "--priority\0now",
+)
 PACKS = """
 import asyncio, os, sys
 from service.system.executors import packing

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, SceneEdit
+from service.document import parse_scene
 from service.ipc import messages
 from service.ipc.messages import Done, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.ipc.task_control import Hold
 from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.task import HOLD_S
 from tests.documents import Shelf
 from tests.serving import SCENE

@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 
 from service.config import MIB, Config
+from service.document import MeshShape, load_json
+from service.document.text import most_bytes, weigh
 from service.ipc import channel
 from service.problems import InvalidDocument, MalformedJson, ServiceError, TooLarge
-from service.requests import parser_pool
-from service.requests.parser_pool import ParserPool
-from service.requests.request_parser import RequestParser, unfolded
-from service.scene import MeshShape, load_json
-from service.scene.text import most_bytes, weigh
+from service.server.requests import parser_pool
+from service.server.requests.parser_pool import ParserPool
+from service.server.requests.request_parser import RequestParser, unfolded
 from service.system.child_processes import Child
 from service.system.turns import CALLER
 from tests.serving import SCENE, SMALL
@@ -77,7 +77,7 @@ def time_of(pid: int) -> float:
 def test_a_message_that_comes_during_work_ends_no_child() -> None:
     """The kernel's notice of a message may come when the message has been read. As a signal it ended the child: of
     30 files that 12 processes read at a time, one "crashed the parser"."""
-    child = Child("service.requests.parser_child", {})
+    child = Child("service.server.requests.parser_child", {})
     large = {**MESH, "vertices": ROWS * 100}
     body = written({**REQUEST, "scene": {**SCENE, "shapes": [*SCENE["shapes"], large]}})
     work = parser_pool.Work("request", body, config(), 512 * MIB, 60.0)

@@ -25,17 +25,17 @@ from service.ipc.messages import (
     View,
 )
 from service.problems import Conflict, ServiceError, Unavailable
-from service.renders import queue as queues
-from service.renders import rendering, slots, viewer
-from service.renders.job import Job
-from service.renders.life import Ended, Life, PictureAt, Tracing
-from service.renders.queue import RenderQueue
-from service.renders.recorder import Recorder
-from service.renders.store import rows
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES
-from service.storage.database import FILE
+from service.server.renders import queue as queues
+from service.server.renders import rendering, slots, viewer
+from service.server.renders.job import Job
+from service.server.renders.life import Ended, Life, PictureAt, Tracing
+from service.server.renders.queue import RenderQueue
+from service.server.renders.recorder import Recorder
+from service.server.renders.store import rows
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.database import FILE
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import SETTINGS, load, until

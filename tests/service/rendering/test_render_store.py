@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import cli
+from service.cli import program as cli
 from service.config import Config
 from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import FieldError, Internal, InvalidDocument, Unavailable
-from service.renders.store import rows
-from service.renders.store import store as store_module
-from service.renders.store.pictures import DamagedPicture, PictureFiles
-from service.renders.store.record import IdempotencyKey, Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES, AllowedUses
-from service.storage.database import Database
-from service.storage.stores import storage
+from service.server.renders.store import rows
+from service.server.renders.store import store as store_module
+from service.server.renders.store.pictures import DamagedPicture, PictureFiles
+from service.server.renders.store.record import IdempotencyKey, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES, AllowedUses
+from service.server.storage.database import Database
+from service.server.storage.stores import storage
 from tests.service.rendering.stored import DOCUMENT, PROGRESS, order, picture
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

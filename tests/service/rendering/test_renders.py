@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from service.problems import Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
-from service.renders.followers import Changes
-from service.renders.queue import RenderQueue
-from service.renders.retention import QueueLimits
+from service.server.renders.followers import Changes
+from service.server.renders.queue import RenderQueue
+from service.server.renders.retention import QueueLimits
 from tests.queues import LIMITS
 
 

@@ -14,16 +14,16 @@ import pytest
 from service.config import MIB, Config
 from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import Gone, TooManyRequests, Unavailable
-from service.renders.documents import WaitingDocuments
-from service.renders.job import Job
-from service.renders.queue import RenderQueue
-from service.renders.retention import KeptRenders, Retention
-from service.renders.status import status
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES, AllowedUses
-from service.storage.quota import QuotaUsedUp, reserve_bytes
-from service.storage.stores import Storage, storage
+from service.server.renders.documents import WaitingDocuments
+from service.server.renders.job import Job
+from service.server.renders.queue import RenderQueue
+from service.server.renders.retention import KeptRenders, Retention
+from service.server.renders.status import status
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES, AllowedUses
+from service.server.storage.quota import QuotaUsedUp, reserve_bytes
+from service.server.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
 from tests.asset_files import OBJ
 from tests.queues import LIMITS

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from service.scene import Scene, merge_patch, parse_scene
-from service.streams.scene_diff import SceneDiff, scene_diff
+from service.document import Scene, merge_patch, parse_scene
+from service.server.streams.scene_diff import SceneDiff, scene_diff
 from tests.serving import SCENE
 
 TEXTURE = {"asset": "sha256:" + "2" * 64}

@@ -8,9 +8,9 @@ import pytest
 
 from gpu import Renderer, SceneEdit
 from gpu.picture.tiles import LEAST_A_PASS
+from service.document import parse_scene
 from service.ipc.messages import StopRule, Update
 from service.pack import pack
-from service.scene import parse_scene
 from service.worker.context import WorkerContext
 from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.scheduler import (

@@ -9,13 +9,13 @@ from typing import Any, cast
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from service.assets import Assets
 from service.config import Config
+from service.formats import Assets
 from service.problems import NotFound, TooManyRequests, Unavailable
 from service.renderers.local.supervisor import Supervisor
-from service.requests.request_reader import RequestReader
-from service.streams import sessions
-from service.streams.sessions import Sessions
+from service.server.requests.request_reader import RequestReader
+from service.server.streams import sessions
+from service.server.streams.sessions import Sessions
 from tests.calls import metrics
 from tests.serving import ENDLESS, KEYS, Client, Picture, Server, wait_until
 

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.document.quality import ResolvedSettings
 from service.ipc.messages import Done, Progress, SavedPicture, View
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
-from service.quality import ResolvedSettings
 from service.renderers.local.supervisor import Supervisor
-from service.renders import preemption, slots
-from service.renders.job import Job
-from service.renders.preemption import giving_way
-from service.renders.queue import RenderQueue
-from service.renders.recent import RECENT_S
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.storage.asset_access import NO_USES
+from service.server.renders import preemption, slots
+from service.server.renders.job import Job
+from service.server.renders.preemption import giving_way
+from service.server.renders.queue import RenderQueue
+from service.server.renders.recent import RECENT_S
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.storage.asset_access import NO_USES
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, Renderers, until

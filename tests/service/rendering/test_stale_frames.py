@@ -11,8 +11,8 @@ import numpy as np
 from service.config import Config
 from service.ipc.messages import Frame, Progress, Want
 from service.renderers.statistics import Statistics
-from service.requests.request_reader import RequestReader
-from service.streams.stream import Stream
+from service.server.requests.request_reader import RequestReader
+from service.server.streams.stream import Stream
 from tests.service.rendering.fakes import until
 
 

@@ -16,16 +16,16 @@ from typing import Any
 import pytest
 
 from gpu import Renderer
-from service.batches.batch import member_id
-from service.commands.check_data import check_renders
+from service.cli.check_data import check_renders
 from service.config import Config
 from service.ipc.messages import Progress
-from service.renders.store.rows import stored_renders
-from service.renders.store.store import RenderStore
-from service.storage.data_check import Report
-from service.storage.database import FILE
-from service.storage.documents import Documents
-from service.storage.stores import storage
+from service.server.batches.batch import member_id
+from service.server.renders.store.rows import stored_renders
+from service.server.renders.store.store import RenderStore
+from service.server.storage.data_check import Report
+from service.server.storage.database import FILE
+from service.server.storage.documents import Documents
+from service.server.storage.stores import storage
 from tests.calls import status
 from tests.marks import seldom
 from tests.service import frozen

@@ -10,16 +10,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from service.assets import Assets
 from service.config import Config
+from service.formats import Assets
 from service.pack import CacheBudget, PackCache
 from service.problems import InvalidDocument, TooLarge, TooManyRequests
 from service.renderers import working_states
 from service.renderers.local.supervisor import Supervisor
-from service.requests.request_reader import RequestReader
-from service.streams import protocol
-from service.streams.edit_session import EditSession
-from service.streams.stream import WAITING_CHARACTERS, Stream
+from service.server.requests.request_reader import RequestReader
+from service.server.streams import protocol
+from service.server.streams.edit_session import EditSession
+from service.server.streams.stream import WAITING_CHARACTERS, Stream
 from service.system.turns import CALLER
 from tests.serving import SCENE, SMALL
 

@@ -14,12 +14,12 @@ import pytest
 from pydantic import BaseModel
 
 from gpu.kernels import features
+from service.document import Scene, parse_scene
+from service.document.document import Parsed
+from service.document.material.measured import MeasuredMaterial
 from service.pack import PackCache, pack
 from service.problems import InvalidDocument
-from service.scene import Scene, parse_scene
-from service.scene.document import Parsed
-from service.scene.material.measured import MeasuredMaterial
-from service.streams.scene_diff import BLINDING, scene_diff
+from service.server.streams.scene_diff import BLINDING, scene_diff
 from tests.documents import Shelf, cube_data, picture
 
 Json = dict[str, Any]

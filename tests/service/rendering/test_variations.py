@@ -13,22 +13,22 @@ from typing import Any
 import pytest
 
 from service.config import Config
+from service.document import merge_patch
+from service.document.document import Parsed
 from service.pack import Packed
 from service.problems import InvalidDocument
-from service.renders import slots
-from service.renders.job import Job
-from service.renders.queue import RenderQueue
-from service.renders.scene import PackedScenes
-from service.renders.store.check import check_renders
-from service.renders.store.record import Order, Outcome
-from service.renders.store.store import RenderStore
-from service.requests.request_parser import folded, unfolded
-from service.requests.request_reader import RequestReader
-from service.scene import merge_patch
-from service.scene.document import Parsed
-from service.storage.asset_access import NO_USES
-from service.storage.data_check import Report
-from service.storage.database import FILE
+from service.server.renders import slots
+from service.server.renders.job import Job
+from service.server.renders.queue import RenderQueue
+from service.server.renders.scene import PackedScenes
+from service.server.renders.store.check import check_renders
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.store import RenderStore
+from service.server.requests.request_parser import folded, unfolded
+from service.server.requests.request_reader import RequestReader
+from service.server.storage.asset_access import NO_USES
+from service.server.storage.data_check import Report
+from service.server.storage.database import FILE
 from tests.documents import Shelf
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, until

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, SceneEdit
+from service.document import parse_scene
 from service.ipc import channel, heartbeat
 from service.ipc.leases import Lease
 from service.ipc.messages import (
@@ -37,7 +38,6 @@ from service.pack import pack
 from service.problems import Unavailable
 from service.renderers.local.keeper import CLOSING
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
 from service.worker.loop import Loop, coalesced
 from service.worker.progress.noise import NoiseReading
@@ -369,6 +369,6 @@ def test_its_end_is_told_to_all_who_have_work_there() -> None:
 @pytest.mark.parametrize("module", ["service.worker.loop", "service.worker.helpers.compile_main"])
 def test_what_renders_loads_no_model_of_a_document(module: str) -> None:
     """pydantic and the models take as long to load as all else that these processes need."""
-    program = f"import sys, {module}; print({{'pydantic', 'service.scene', 'asyncio'}} & set(sys.modules))"
+    program = f"import sys, {module}; print({{'pydantic', 'service.document', 'asyncio'}} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert (answer.returncode, answer.stdout) == (0, "set()\n"), answer.stderr

@@ -1,5 +1,5 @@
 // Reflection by half and difference angles, between the middles of the table's cells [Rusinkiewicz 1998; Matusik et al.
-// 2003]. service/assets/measured/merl.py does the same.
+// 2003]. service/formats/read/measured/merl.py does the same.
 #if HAS_MEASURED_ANGLES
 vec3 half_difference_eval(Measured m, vec3 wo, vec3 wi) {
     vec3 sum = wo + wi;

@@ -1,6 +1,6 @@
 // Densities over the unit square, one for each of the viewer's directions, bilinear between their nodes; between the
 // viewer's directions, densities and their integrals are interpolated linearly [Dupuy & Jakob 2018, supplement].
-// gpu/layout/measured_records.py has the texels; service/assets/measured/warp.py the same for single densities.
+// gpu/layout/measured_records.py has the texels; service/formats/read/measured/warp.py the same for single densities.
 #if HAS_MEASURED
 
 // The tables of up to four neighbouring directions of the viewer, and their weights.

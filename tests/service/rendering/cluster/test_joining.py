@@ -27,7 +27,7 @@ from service.renderers.ray.control import Ended
 from service.renderers.ray.joining import CannotJoin, close_token_file
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described, plan
-from service.state import AppState
+from service.server.state import AppState
 from tests.service.rendering.cluster.clusters import OPTIONS, until
 from tests.serving import PATIENCE_S
 from tests.supervisors import arrays_of

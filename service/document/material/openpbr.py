@@ -1,0 +1,400 @@
+"""`openpbr`: OpenPBR Surface 1.1.1, with its names, ranges and defaults.
+
+https://academysoftwarefoundation.github.io/OpenPBR. Colours are linear Rec.709, as everywhere in a document, where
+the specification assumes ACEScg; lengths are metres. What the specification leaves open is in docs/rendering.md.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from service.document.base import OMITTABLE, hint
+from service.document.material import openpbr_film as film
+from service.document.material import openpbr_words, subsurface
+from service.document.material.abbe import Abbe, dispersion
+from service.document.material.surface import AnySurface, EmissionSides, Height
+from service.document.material.tangent import Tangent, turn_of
+from service.document.numbers import BRIGHTEST, Fraction
+from service.document.texture import (
+    AnyFactor,
+    AnyFraction,
+    AnyRadiometric,
+    AnyReflectance,
+    ColorTexture,
+    NormalTexture,
+    ScalarTexture,
+)
+
+Luminance = Annotated[float, Field(ge=0, le=BRIGHTEST)]
+
+
+class OpenpbrMaterial(AnySurface):
+    """OpenPBR Surface 1.1.1: fuzz over a coat over metal, plastic or glass."""
+
+    model_config = ConfigDict(json_schema_extra={"x-name": "OpenPBR"})
+
+    type: Literal["openpbr"]
+    base_weight: Annotated[
+        AnyFraction,
+        hint("Base weight", "How strong the base colour is.", group="Base", unit="", widget="slider"),
+    ] = 1.0
+    base_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Base colour",
+            "The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9.",
+            group="Base",
+            unit="",
+            widget="color",
+        ),
+    ] = (0.8, 0.8, 0.8)
+    base_diffuse_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Diffuse roughness",
+            "0 is smooth; above it the surface looks flatter, as clay or plaster do.",
+            group="Base",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    base_metalness: Annotated[
+        AnyFraction,
+        hint(
+            "Metalness",
+            "0 is no metal, 1 is metal. Values between are for dust, rust or blends.",
+            known_as="metallic",
+            group="Base",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    specular_weight: Annotated[
+        AnyFactor,
+        hint(
+            "Specular weight",
+            "How strongly the surface mirrors.",
+            group="Specular",
+            unit="",
+            widget="slider",
+            soft=1,
+        ),
+    ] = 1.0
+    specular_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Specular colour",
+            "Tints the reflection; of a metal, only its rim.",
+            group="Specular",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    specular_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Roughness",
+            "0 is polished, 1 is matte.",
+            known_as="roughness",
+            group="Specular",
+            highlight=("roughness", None),
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.3
+    specular_roughness_anisotropy: Annotated[
+        AnyFraction,
+        hint(
+            "Anisotropy",
+            "Stretches the highlight, as on brushed metal; above 0.9 nothing changes any more.",
+            known_as="anisotropic",
+            group="Specular",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    specular_ior: Annotated[
+        film.AnyPositiveIndex,
+        hint(
+            "Index of refraction",
+            "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. A texture gives 1 to 4.",
+            known_as="ior",
+            group="Specular",
+            unit="",
+            widget="slider",
+            soft=(1, 3),
+        ),
+    ] = 1.5
+    transmission_weight: Annotated[
+        AnyFraction,
+        hint(
+            "Transmission",
+            "How clear the material is: 1 is glass.",
+            known_as="transmission",
+            group="Transmission",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    transmission_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Transmission colour",
+            "The colour of light that has gone through the material.",
+            group="Transmission",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    transmission_depth: subsurface.Depth = 0.0
+    transmission_scatter: subsurface.Scatter = (0.0, 0.0, 0.0)
+    transmission_scatter_anisotropy: subsurface.ScatterAnisotropy = 0.0
+    transmission_dispersion_scale: Annotated[
+        Fraction,
+        hint(
+            "Dispersion", "How much light is split into colours, as by a prism: 0 is not at all.",
+            group="Transmission", unit="", widget="slider",
+        ),
+    ] = 0.0  # fmt: skip
+    transmission_dispersion_abbe_number: Annotated[
+        Abbe,
+        hint(
+            "Abbe number",
+            "Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60.",
+            group="Transmission", unit="", widget="slider", soft=(9, 91),
+        ),
+    ] = 20.0  # fmt: skip
+    subsurface_weight: subsurface.Weight = 0.0
+    subsurface_color: subsurface.Color = (0.8, 0.8, 0.8)
+    subsurface_radius: subsurface.Radius = 1.0
+    subsurface_radius_scale: subsurface.RadiusScale = (1.0, 0.5, 0.25)
+    subsurface_scatter_anisotropy: subsurface.Anisotropy = 0.0
+    coat_weight: Annotated[
+        AnyFraction,
+        hint(
+            "Coat",
+            "How much of the surface is covered by clear lacquer.",
+            known_as="clearcoat",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    coat_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Coat colour",
+            "The tint of the lacquer.",
+            group="Coat",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    coat_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Coat roughness",
+            "How rough the lacquer is: 0 is a perfect varnish.",
+            known_as="clearcoat_roughness",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    coat_roughness_anisotropy: Annotated[
+        AnyFraction,
+        hint(
+            "Coat anisotropy",
+            "Stretches the highlight of the lacquer.",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    coat_ior: Annotated[
+        film.AnyPositiveIndex,
+        hint(
+            "Coat index", "How strongly the lacquer bends and mirrors light: 1.5 to 1.6.",
+            group="Coat", unit="", widget="slider", soft=(1, 3),
+        ),
+    ] = 1.6  # fmt: skip
+    coat_darkening: Annotated[
+        AnyFraction,
+        hint(
+            "Coat darkening", "How much the lacquer deepens the colours under it, as varnish does wood.",
+            group="Coat", unit="", widget="slider",
+        ),
+    ] = 1.0  # fmt: skip
+    fuzz_weight: Annotated[
+        AnyFraction,
+        hint(
+            "Fuzz",
+            "How much of the surface is covered by fibres or dust.",
+            known_as="sheen",
+            group="Sheen",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    fuzz_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Fuzz colour",
+            "The colour of the fibres or the dust.",
+            known_as="sheen_color",
+            group="Sheen",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    fuzz_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Fuzz roughness",
+            "How far the fuzz reaches inwards from the rim: cloth is low, dust high.",
+            known_as="sheen_roughness",
+            group="Sheen",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.5
+    thin_film_weight: film.FilmWeight = 0.0
+    thin_film_thickness: film.FilmThickness = 0.5
+    thin_film_ior: film.FilmIndex = 1.4
+    emission_luminance: Annotated[
+        Luminance,
+        hint(
+            "Emission",
+            "The light that leaves the front side. Above 0 the thing is a lamp.",
+            group="Emission",
+            unit="cd/m^2",
+            widget="slider",
+            soft=1000,
+        ),
+    ] = 0.0
+    emission_color: Annotated[
+        AnyRadiometric,
+        hint("Emission colour", "The colour of the light.", group="Emission", unit="", widget="color", soft=1),
+    ] = (1.0, 1.0, 1.0)
+    emission_sides: EmissionSides = "front"
+    geometry_opacity: Annotated[
+        AnyFraction,
+        hint(
+            "Opacity",
+            "1 is solid, 0.5 a fine mesh, 0 is not there at all.",
+            known_as="alpha",
+            group="Geometry",
+            unit="",
+            widget="slider",
+        ),
+    ] = 1.0
+    geometry_thin_walled: Annotated[
+        bool,
+        hint(
+            "Thin walled", "A sheet without an inside, such as a window pane: light goes straight through.",
+            known_as="thin_walled", group="Geometry",
+        ),
+    ] = False  # fmt: skip
+    geometry_normal: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint(
+            "Normal map",
+            "Small bumps: an image that changes how the surface catches the light, but not its outline.",
+            known_as="normal_map",
+            group="Geometry",
+        ),
+    ] = None
+    geometry_tangent: Annotated[
+        Tangent | None,
+        OMITTABLE,
+        hint(
+            "Tangent",
+            "The direction in which highlights are stretched, along the texture coordinates u and v.",
+            group="Geometry",
+            unit="",
+            widget="number",
+            absent="along u",
+        ),
+    ] = None
+    geometry_coat_normal: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint(
+            "Coat normal map",
+            "Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it.",
+            known_as="clearcoat_normal_map",
+            group="Coat",
+        ),
+    ] = None
+    geometry_coat_tangent: Annotated[
+        Tangent | None,
+        OMITTABLE,
+        hint(
+            "Coat tangent", "The direction in which the highlights of the lacquer are stretched.",
+            group="Coat", unit="", widget="number", absent="along u",
+        ),
+    ] = None  # fmt: skip
+    height: Height = None
+
+    def value(self, name: str) -> Any:
+        found = super().value(name)
+        if name == "emission_color":
+            share = self.emission_luminance / openpbr_words.NITS
+            if isinstance(found, ColorTexture):
+                return found.model_copy(update={"factor": tuple(share * x for x in found.factor)})
+            return tuple(share * x for x in found)
+        if name == "transmission_dispersion_abbe_number":
+            return dispersion(found, self.transmission_dispersion_scale)
+        if name == "thin_film_thickness":
+            return film.in_nanometres(found)
+        if name == "transmission_depth":
+            return found or None
+        if name == "subsurface_radius_scale":
+            return subsurface.radii(self.subsurface_radius, found)
+        if name in ("transmission_scatter_anisotropy", "subsurface_scatter_anisotropy"):
+            return subsurface.open_interval(found)
+        if name in ("geometry_tangent", "geometry_coat_tangent"):
+            return 0.0 if found is None else turn_of(found)
+        return found
+
+    def derived(self) -> dict[str, float]:
+        """A thin wall is as thick as a leaf: what walks in it comes out on either side."""
+        if not self.geometry_thin_walled:
+            return {}
+        through = subsurface.factor_of(self.subsurface_weight) * (1 + self.subsurface_scatter_anisotropy) / 2
+        return {"diffuse_transmission": through}
+
+    def is_filled(self) -> bool:
+        """Whether it says by itself what is under its surface."""
+        walks = subsurface.factor_of(self.subsurface_weight) > 0 and self.subsurface_radius > 0
+        return (walks or self.transmission_depth > 0) and not self.geometry_thin_walled
+
+    @classmethod
+    def left(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        return openpbr_words.leave(old, made)
+
+    @classmethod
+    def taken(cls, old: dict[str, Any], made: dict[str, Any]) -> set[str]:
+        return openpbr_words.take(old, made)
+
+    # What all models have, under the names that they have in common.
+    @property
+    def emission(self) -> Any:
+        return self.value("emission_color")
+
+    @property
+    def alpha(self) -> float | ScalarTexture:
+        return self.geometry_opacity
+
+    @property
+    def alpha_cutoff(self) -> None:
+        return None
+
+    @property
+    def anisotropic(self) -> Any:
+        """That of the base, or else of the coat."""
+        own = self.specular_roughness_anisotropy
+        return own if isinstance(own, ScalarTexture) or own > 0 else self.coat_roughness_anisotropy

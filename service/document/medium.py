@@ -1,0 +1,116 @@
+"""What fills a closed shape, or all space outside of bodies: absorption, scattering and emission along the way."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+
+from service.document.base import OMITTABLE, Model, hint, refusal
+from service.document.color import Color, Reflectance, color, color_schema
+from service.document.half_space import single_scattering_albedo
+from service.document.numbers import LARGEST
+from service.document.photometry import Radiance
+
+LEAST_RADIUS = 1 / LARGEST
+LARGEST_G = 1 - 2.0**-24  # the largest mean cosine below 1 in single precision, of which there is a phase function
+
+Coefficient = Annotated[Color, PlainValidator(color(LARGEST)), WithJsonSchema(color_schema(LARGEST))]
+
+
+class Medium(Model):
+    """A homogeneous medium, by its coefficients or by the colour and the mean free path that it shows."""
+
+    absorption: Annotated[
+        Coefficient,
+        hint(
+            "Absorption",
+            "The rate at which light is lost, per channel.",
+            unit="1/m",
+            widget="color",
+            soft=1000,
+            log=0.01,
+        ),
+    ] = (0.0, 0.0, 0.0)
+    scattering: Annotated[
+        Coefficient,
+        hint(
+            "Scattering",
+            "The rate at which light turns, per channel.",
+            unit="1/m",
+            widget="color",
+            soft=1000,
+            log=0.01,
+        ),
+    ] = (0.0, 0.0, 0.0)
+    albedo: Annotated[
+        Reflectance | None,
+        OMITTABLE,
+        hint(
+            "Albedo",
+            "The colour that much of it has. With a radius it replaces absorption and scattering.",
+            unit="",
+            widget="color",
+            absent="from absorption and scattering",
+        ),
+    ] = None
+    radius: Annotated[
+        Coefficient | None,
+        OMITTABLE,
+        hint(
+            "Radius",
+            "How far light goes, on average, before something happens to it, per channel.",
+            unit="m",
+            widget="color",
+            soft=1,
+            log=1e-5,
+            absent="from absorption and scattering",
+        ),
+    ] = None
+    g: Annotated[
+        float,
+        Field(gt=-1, lt=1),
+        hint(
+            "Direction",
+            "Where light goes when it is scattered: above 0 onwards, below 0 back.",
+            unit="",
+            widget="slider",
+            soft=(-0.95, 0.95),
+        ),
+    ] = 0.0
+    emission: Annotated[
+        Radiance,
+        hint(
+            "Emission",
+            "The light that it gives off itself, for each metre.",
+            unit="W/(m^3 sr)",
+            widget="color",
+            soft=4,
+        ),
+    ] = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_given_once(self) -> Self:
+        if (self.albedo is None) != (self.radius is None):
+            missing, other = ("radius", "albedo") if self.radius is None else ("albedo", "radius")
+            raise refusal(f"is required beside {other}", at=f"/{missing}")
+        if self.radius is not None:
+            for name in ("absorption", "scattering"):
+                if any(getattr(self, name)):
+                    raise refusal(f"a medium has {name}, or albedo and radius, not both", at=f"/{name}")
+            if min(self.radius) < LEAST_RADIUS:
+                raise refusal(f"must be at least {LEAST_RADIUS:g} in every channel", at="/radius")
+        return self
+
+    def coefficients(self) -> tuple[Color, Color]:
+        """Extinction and scattering, 1/m per channel."""
+        if self.albedo is None or self.radius is None:
+            red, green, blue = (a + s for a, s in zip(self.absorption, self.scattering, strict=True))
+            return (red, green, blue), self.scattering
+        red, green, blue = (1 / r for r in self.radius)
+        share = [single_scattering_albedo(a, self.g) for a in self.albedo]
+        return (red, green, blue), (red * share[0], green * share[1], blue * share[2])
+
+    def is_empty(self) -> bool:
+        """Whether light passes as through a vacuum."""
+        return not any(self.coefficients()[0]) and not any(self.emission)

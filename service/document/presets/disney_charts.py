@@ -1,0 +1,119 @@
+"""Charts of the `disney` model's parameters, as in the notes that introduced it.
+
+[Burley 2012, "Physically Based Shading at Disney", figure 16: a row of spheres for each parameter.]
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from service.document.presets.lettering import written
+
+STEPS = 11  # spheres of a row: the parameter is 0, .1, ... 1
+# What each row's material has besides its own parameter: without specular light a specular tint shows nothing.
+ROWS: dict[str, dict[str, Any]] = {
+    "base_color": {"roughness": 0.5},
+    "subsurface": {"base_color": [0.82, 0.5, 0.36], "roughness": 1, "specular": 0.2},
+    "metallic": {"base_color": [0.9, 0.62, 0.26], "roughness": 0.25},
+    "specular": {"base_color": [0.28, 0.02, 0.02], "roughness": 0.25},
+    "specular_tint": {"base_color": [0.42, 0.03, 0.03], "roughness": 0.25, "specular": 1},
+    "roughness": {"base_color": [0.02, 0.12, 0.34], "specular": 1},
+    "anisotropic": {"base_color": [0.78, 0.72, 0.6], "metallic": 1, "roughness": 0.45},
+    "sheen": {"base_color": [0.006, 0.05, 0.04], "roughness": 1, "specular": 0},
+    "sheen_tint": {"base_color": [0.006, 0.05, 0.04], "roughness": 1, "specular": 0, "sheen": 1},
+    "clearcoat": {"base_color": [0.14, 0.008, 0.02], "roughness": 1, "specular": 0},
+    "clearcoat_gloss": {"base_color": [0.14, 0.008, 0.02], "roughness": 1, "specular": 0, "clearcoat": 1},
+}
+# A lamp from the front, by whose highlight gloss is judged, and one from behind: sheen is seen against the light.
+LAMPS = [
+    {"type": "directional", "direction": [0.5, -0.6, -0.8], "irradiance": 2, "angular_diameter": 5},
+    {"type": "directional", "direction": [-0.55, -0.35, 1], "irradiance": 5, "angular_diameter": 10},
+]
+
+GRID = (0.0, 0.25, 0.5, 0.75, 1.0)
+GRID_SPECULAR = (0.0, 0.25, 0.5, 1.0)
+
+RADIUS, PITCH = 0.45, 1.0  # metres
+LETTERS = 0.06  # metres of a square of the labels' letters
+INK = {"type": "diffuse", "albedo": 0.01}
+
+
+def parameter_rows() -> dict[str, Any]:
+    """A row for each parameter, from 0 on the left to 1 on the right; base_color goes from black to white."""
+    materials, shapes = dict[str, Any](), list[dict[str, Any]]()
+    for row, (parameter, others) in enumerate(ROWS.items()):
+        for step in range(STEPS):
+            value = round(step / (STEPS - 1), 3)
+            name = f"{parameter.replace('_', ' ').replace('color', 'colour').capitalize()} {value:.1f}"
+            materials[name] = {"type": "disney", **others, parameter: value}
+            shapes.append(_ball(step - (STEPS - 1) / 2, (len(ROWS) - 1) / 2 - row, name))
+    chart = _chart("Disney parameters, 0 to 1", "disney-parameters-labels", materials, shapes, distance=26.5)
+    chart["camera"] |= {"position": [-1.6, 0.2, 26.5], "target": [-1.6, 0.2, 0]}  # labels stand on the left
+    return chart | {"lights": LAMPS}
+
+
+def parameter_labels() -> bytes:
+    """Of each row on its left, and 0, 0.5 and 1 above their columns."""
+    end, top = (STEPS - 1) / 2, (len(ROWS) - 1) / 2
+    rows = [(name.replace("_", " "), -end - 0.75, top - row, 1.0) for row, name in enumerate(ROWS)]
+    return written([*rows, *((f"{x + 0.5:g}", x * 2 * end, top + 0.85, 0.5) for x in (-0.5, 0.0, 0.5))], LETTERS)
+
+
+def parameter_grid() -> dict[str, Any]:
+    """Four blocks, specular 0 and 0.25 above 0.5 and 1; in each roughness grows to the right, metallic upwards."""
+    materials, shapes = dict[str, Any](), list[dict[str, Any]]()
+    middle, apart = (len(GRID) - 1) / 2, len(GRID) + 0.6
+    for block, specular in enumerate(GRID_SPECULAR):
+        for row, metallic in enumerate(GRID):
+            for column, roughness in enumerate(GRID):
+                name = f"Metallic {metallic:g}, roughness {roughness:g}, specular {specular:g}"
+                materials[name] = {
+                    "type": "disney",
+                    "base_color": [0.75, 0.34, 0.16],
+                    "metallic": metallic,
+                    "roughness": roughness,
+                    "specular": specular,
+                }
+                x, y = (block % 2 - 0.5) * apart, (0.5 - block // 2) * apart
+                shapes.append(_ball(x + column - middle, y + row - middle, name))
+    title = "Disney grid: metallic, roughness, specular"
+    chart = _chart(title, "disney-grid-labels", materials, shapes, distance=24.6)
+    chart["camera"] |= {"position": [-0.5, -0.15, 24.6], "target": [-0.5, -0.15, 0]}
+    return chart
+
+
+def grid_labels() -> bytes:
+    """Of each block its specular above it; of the roughness below, of the metallic on the left."""
+    apart, reach = len(GRID) + 0.6, (len(GRID) - 1) / 2
+    lines = []
+    for block, specular in enumerate(GRID_SPECULAR):
+        x, y = (block % 2 - 0.5) * apart, (0.5 - block // 2) * apart
+        lines.append((f"specular {specular:g}", x, y + reach + 0.72, 0.5))
+        if block // 2:
+            lines += [(f"{value:g}", x + k - reach, y - reach - 0.7, 0.5) for k, value in enumerate(GRID)]
+            lines.append(("roughness", x, y - reach - 1.1, 0.5))
+        if not block % 2:
+            lines += [(f"{value:g}", x - reach - 0.65, y + k - reach, 1.0) for k, value in enumerate(GRID)]
+            lines.append(("metallic", x - reach - 0.55, y + reach + 0.72, 1.0))
+    return written(lines, 0.8 * LETTERS)
+
+
+def _ball(x: float, y: float, material: str) -> dict[str, Any]:
+    center = [round(x * PITCH, 3), round(y * PITCH, 3), 0]
+    return {"type": "sphere", "center": center, "radius": RADIUS, "material": material}
+
+
+def _chart(
+    title: str, labels: str, materials: dict[str, Any], shapes: list[dict[str, Any]], distance: float
+) -> dict[str, Any]:
+    """Nothing stands between the spheres and the studio's lamps but other spheres."""
+    return {
+        "title": title,
+        "group": "Tests",
+        "version": 1,
+        # A long lens: all spheres are seen and lit nearly alike.
+        "camera": {"position": [0, 0, distance], "target": [0, 0, 0], "vfov": 28},
+        "environment": {"type": "image", "asset": "builtin:studio", "rotation": -20},
+        "materials": materials | {"Ink": INK},
+        "shapes": [*shapes, {"name": "Labels", "type": "mesh", "asset": f"builtin:{labels}", "material": "Ink"}],
+    }

@@ -1,0 +1,147 @@
+"""The format of some bytes: by the bytes themselves, else by the content type and the name that were sent."""
+
+import re
+import struct
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
+from functools import cache
+from importlib.util import find_spec
+from mmap import mmap
+
+from service.formats.types import Kind
+
+COMPRESSIONS = ("draco", "meshopt", "ktx2")  # of meshes and images inside glTF files
+
+# What installs the package that a format needs, and the module by which it is known to be there.
+PACKAGES: dict[str, tuple[str, str]] = {
+    "meshopt": ("meshopt", "meshopt"),
+    "ktx2": ("opengl-basisu", "opengl_basisu"),
+    "mtlx": ("sunbox-server[materialx]", "MaterialX"),
+    "usd": ("sunbox-server[usd]", "pxr"),
+}
+
+KINDS: dict[str, Kind] = {
+    "obj": "mesh",
+    "ply": "mesh",
+    "stl": "mesh",
+    "glb": "scene",
+    "gltf": "scene",
+    "zip": "scene",  # or "materials", by what is in it
+    "mtlx": "materials",
+    "usd": "scene",
+    "exr": "image",
+    "hdr": "image",
+    "png": "image",
+    "jpeg": "image",
+    "webp": "image",
+    "cube": "lut",
+    "binary": "measured",  # of the MERL database
+    "bsdf": "measured",  # of the RGL database
+}
+
+CRATE, USD_TEXT = b"PXR-USDC", b"#usda"
+USD_LAYERS = (".usd", ".usda", ".usdc")  # the first file of a .usdz is one of these
+
+MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "png"),
+    (b"\xff\xd8\xff", "jpeg"),
+    (b"\x76\x2f\x31\x01", "exr"),
+    (b"#?RADIANCE", "hdr"),
+    (b"#?RGBE", "hdr"),
+    (b"glTF", "glb"),
+    (b"PK\x03\x04", "zip"),
+    (CRATE, "usd"),
+    (USD_TEXT, "usd"),
+    (b"ply\n", "ply"),
+    (b"ply\r", "ply"),
+    (b"tensor_file\0", "bsdf"),
+    (struct.pack("<3i", 90, 90, 180), "binary"),
+)
+
+CONTENT_TYPES = {
+    "model/obj": "obj",
+    "text/prs.wavefront-obj": "obj",
+    "application/ply": "ply",
+    "model/ply": "ply",
+    "model/stl": "stl",
+    "application/sla": "stl",
+    "model/gltf-binary": "glb",
+    "model/gltf+json": "gltf",
+    "model/vnd.usd+zip": "usd",
+    "model/vnd.usdz+zip": "usd",
+    "model/vnd.usda": "usd",
+    "application/zip": "zip",
+    "application/x-zip-compressed": "zip",
+    "application/mtlx+xml": "mtlx",
+    "application/x-materialx": "mtlx",
+    "image/x-exr": "exr",
+    "image/aces": "exr",
+    "image/vnd.radiance": "hdr",
+    "image/x-hdr": "hdr",
+    "image/png": "png",
+    "image/jpeg": "jpeg",
+    "image/webp": "webp",
+}
+
+SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr", "usda": "usd", "usdc": "usd"}
+
+# OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
+# Possessive quantifiers: a file of blanks would otherwise take exponential time.
+OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
+CUBE_START = re.compile(
+    rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:TITLE|LUT_[13]D_SIZE|LUT_[13]D_INPUT_RANGE|DOMAIN_MIN|DOMAIN_MAX)[ \t]"
+)
+STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
+GLTF_TEXT = re.compile(rb"\s*\{")
+# After what XML has before its root; possessive for the same reason.
+MTLX_TEXT = re.compile(
+    rb"(?:\s++|<\?[^>]*+>|<!--(?:(?!-->).)*+-->|<![A-Z][^>\[]*+(?:\[[^\]]*+\]\s*+)?>)*+<materialx[\s>]", re.DOTALL
+)
+
+
+@cache
+def missing() -> dict[str, str]:
+    """The formats that cannot be read here, with what would have to be installed."""
+    return {name: package for name, (package, module) in PACKAGES.items() if find_spec(module) is None}
+
+
+def text(data: bytes) -> bytes:
+    """A text in UTF-8 without a byte order mark (Windows writes marks, and UTF-16); other bytes are left as they
+    are."""
+    if data.startswith(BOM_UTF8):
+        return data.removeprefix(BOM_UTF8)
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return data.decode("utf-16", "ignore").encode()
+    return data
+
+
+def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
+    """A key of KINDS, or None where the format is unknown."""
+    head = data[:65536]
+    for magic, name in MAGIC:
+        if head.startswith(magic):
+            return "usd" if name == "zip" and _is_usdz(head) else name
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return "webp"
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):
+        return "stl"
+    words = text(head)
+    if STL_TEXT.match(words):
+        return "stl"
+    if GLTF_TEXT.match(words) and data.find(b'"asset"') >= 0:
+        return "gltf"
+    if MTLX_TEXT.match(words):
+        return "mtlx"
+    if CUBE_START.match(words):
+        return "cube"
+    if OBJ_START.match(words):
+        return "obj"
+    named = (content_type or "").partition(";")[0].strip().lower()
+    if named in CONTENT_TYPES:
+        return CONTENT_TYPES[named]
+    return SUFFIXES.get((filename or "").rpartition(".")[2].lower())
+
+
+def _is_usdz(head: bytes) -> bool:
+    """Whether the first file of a zip is a layer of USD, as the format demands."""
+    name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
+    return name.decode("utf-8", "replace").lower().endswith(USD_LAYERS)

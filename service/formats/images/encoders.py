@@ -1,0 +1,202 @@
+"""One function for each format, which writes pixels to a file with a descriptor.
+
+`pixels` is (height, width, channels), row 0 at the top. PNG, JPEG, WebP and AVIF take display-encoded values
+with straight alpha, uint8 or float 0..1; the others linear float32, colour premultiplied.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from service.displays import SRGB, Encoding
+from service.formats.images import icc
+from service.formats.images.metadata import KEY, png_with_encoding, png_with_text
+
+QUALITY = 80
+FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
+PNG_LEVEL = 1  # zlib's level: higher ones take several times as long to save some percent
+AVIF_SPEED = 7  # 0 to 10; lower ones take several times as long to save some percent
+BAND = 128  # rows of all layers that are interleaved at a time; a multiple of the 16 that EXR compresses at once
+CHANNELS = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+
+Array = npt.NDArray[Any]
+Metadata = dict[str, Any] | str  # or the JSON of one, in ASCII
+
+
+@dataclass(frozen=True)
+class Choices:
+    """Options of all formats; each format ignores the ones that it lacks."""
+
+    bits: int = 8
+    quality: int | None = None
+    metadata: Metadata | None = None
+    encoding: Encoding = SRGB  # what the values of a displayed format stand for
+
+    @property
+    def profile(self) -> dict[str, Any]:
+        """Pillow's option for the ICC profile; sRGB is what a picture without one is taken for."""
+        made = None if self.encoding == SRGB else icc.profile(self.encoding)
+        return {} if made is None else {"icc_profile": made}
+
+
+def write_png(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    png = _png16(pixels) if choices.bits == 16 else _pillow(_bytes(pixels), "PNG", compress_level=PNG_LEVEL)
+    if choices.encoding != SRGB:
+        png = png_with_encoding(png, icc.cicp(choices.encoding), icc.profile(choices.encoding))
+    file.write(png if choices.metadata is None else png_with_text(png, _text(choices.metadata)))
+
+
+def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    """Write a JPEG, over black, as it has no alpha."""
+    quality = QUALITY if choices.quality is None else choices.quality
+    sampling = "4:4:4" if quality >= FULL_COLOUR else "4:2:0"
+    file.write(_pillow(over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling, **choices.profile))
+
+
+def write_webp(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    quality = QUALITY if choices.quality is None else choices.quality
+    file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2, **choices.profile))
+
+
+def write_avif(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    """8 bits, colour at full resolution."""
+    quality = FULL_COLOUR if choices.quality is None else choices.quality
+    options = {"quality": quality, "subsampling": "4:4:4", "speed": AVIF_SPEED}
+    file.write(_pillow(_bytes(pixels), "AVIF", **options, **choices.profile))
+
+
+def write_exr(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    write_exr_layers(file, [pixels], CHANNELS[pixels.shape[2]], choices.metadata)
+
+
+def write_hdr(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    """Write a Radiance HDR, which has no alpha."""
+    _write(file, "hdr", [_three(pixels)], "float", {})
+
+
+def write_npy(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    np.save(file, np.ascontiguousarray(pixels, np.float32), allow_pickle=False)
+
+
+def write_rgba32f(file: BinaryIO, pixels: Array, choices: Choices) -> None:
+    """Four floats for each pixel, without a header: other AOVs become opaque, a single channel grey."""
+    if pixels.shape[2] != 4:
+        pixels = np.concatenate([_three(pixels), np.ones((*pixels.shape[:2], 1), np.float32)], axis=2)
+    file.write(np.ascontiguousarray(pixels, np.float32).data)
+
+
+def write_exr_layers(
+    file: BinaryIO,
+    layers: Sequence[Array],
+    channels: tuple[str, ...],
+    metadata: Metadata | None,
+    more: Mapping[str, str] | None = None,
+) -> None:
+    """Write an EXR; `more` are further attributes."""
+    attributes = {
+        **(more or {}),
+        "compression": "zip",
+        "DateTime": "",
+    }  # else the time of writing: equal pictures give equal files
+    if metadata is not None:
+        attributes[KEY] = _text(metadata)
+    _write(file, "openexr", layers, "float", attributes, channels)
+
+
+def in_memory(write: Callable[[BinaryIO], None]) -> bytes:
+    """The bytes that `write` writes to a file with a descriptor, without which OpenImageIO cannot write."""
+    with os.fdopen(os.memfd_create("sunbox-image", os.MFD_CLOEXEC), "w+b") as file:
+        write(file)
+        file.flush()
+        return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0)
+
+
+def _png16(pixels: Array) -> bytes:
+    """A PNG of 16 bits, by OpenImageIO: Pillow has no such colour images."""
+    whole = pixels if pixels.dtype == np.uint16 else np.rint(_unit(pixels) * 65535).astype(np.uint16)
+    attributes = {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": PNG_LEVEL}
+    return in_memory(lambda file: _write(file, "png", [whole], "uint16", attributes))
+
+
+def _write(
+    file: BinaryIO,
+    format: str,
+    layers: Sequence[Array],
+    kind: str,
+    attributes: Mapping[str, str | int],
+    channels: tuple[str, ...] = (),
+) -> None:
+    """An EXR, by OpenImageIO. `layers` are (height, width, channels) each, and are interleaved in the file."""
+    import OpenImageIO as oiio
+
+    height, width = layers[0].shape[:2]
+    depth = sum(layer.shape[2] for layer in layers)
+    spec = oiio.ImageSpec(width, height, depth, kind)
+    if channels:
+        spec.channelnames = channels
+        spec.alpha_channel = channels.index("A") if "A" in channels else -1
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    if format == "openexr":
+        places = [coordinate for xy in (*icc.PRIMARIES["rec709"], icc.WHITE) for coordinate in xy]
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), places)
+        spec.attribute("colorInteropID", "lin_rec709_scene")  # by the Color Interop Forum's recommendation
+    output = oiio.ImageOutput.create(format)
+    assert output is not None, f"this OpenImageIO writes no {format}"
+    # OpenImageIO takes a name and no descriptor; this is the name of an open file.
+    fine = output.open(f"/proc/self/fd/{file.fileno()}", spec)
+    for top in range(0, height, BAND):
+        rows = [layer[top : top + BAND] for layer in layers]
+        band = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
+        data = np.ascontiguousarray(band, np.uint16 if kind == "uint16" else np.float32)
+        fine = fine and output.write_scanlines(top, top + len(band), 0, data)
+    if not (fine and output.close()):
+        raise OSError(f"{format} could not be written: {output.geterror()}")
+
+
+def _pillow(pixels: npt.NDArray[np.uint8], format: str, **options: Any) -> bytes:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    picture = pixels[:, :, 0] if pixels.shape[2] == 1 else pixels
+    Image.fromarray(np.ascontiguousarray(picture)).save(stream, format, **options)
+    return stream.getvalue()
+
+
+def _bytes(pixels: Array) -> npt.NDArray[np.uint8]:
+    if pixels.dtype == np.uint8:
+        same: npt.NDArray[np.uint8] = pixels
+        return same
+    return np.rint(_unit(pixels) * 255).astype(np.uint8)
+
+
+def _unit(pixels: Array) -> npt.NDArray[np.float32]:
+    if pixels.dtype == np.uint8:
+        return pixels.astype(np.float32) / np.float32(255)
+    return np.clip(pixels, 0, 1).astype(np.float32)
+
+
+def over_black(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    if pixels.shape[2] != 4:
+        return pixels
+    alpha = pixels[:, :, 3:]
+    if (alpha == 255).all():
+        return pixels[:, :, :3]
+    return ((pixels[:, :, :3].astype(np.uint16) * alpha + 127) // 255).astype(np.uint8)
+
+
+def _three(pixels: Array) -> Array:
+    return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[:, :, :3]
+
+
+def _text(metadata: Metadata) -> str:
+    """JSON in ASCII, so that the plainest text chunk can store any name."""
+    return metadata if isinstance(metadata, str) else json.dumps(metadata, separators=(",", ":"))

@@ -1,0 +1,112 @@
+"""KHR_materials_iridescence as the thin film of `principled`, which covers all of a surface or none of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from service.formats.read.gltf.json_view import JsonView
+from service.formats.read.gltf.texture_bake import pixels, png
+from service.formats.read.gltf.textures import Textures
+
+if TYPE_CHECKING:
+    from service.formats.read.gltf.material_reader import MaterialReader
+
+NAME = "KHR_materials_iridescence"
+DEFAULT_IOR, LEAST, MOST = 1.3, 100.0, 400.0  # of the extension; thicknesses in nm
+LARGEST_IOR, THICKEST = 4.0, 1e4  # of ours
+HALF = 0.5  # a film of this factor and above is nearer to a whole one than to none
+LARGEST = 4096  # texels a side of a computed image
+OTHER_HUES = (
+    "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "
+    "most of all on metals"
+)
+
+
+def add(read: MaterialReader, document: dict[str, Any]) -> None:
+    place = read.place.extension(NAME)
+    weight = place.number("iridescenceFactor", 0, 0, 1) if place else 0.0
+    if place is None or weight == 0:
+        return
+    if weight < HALF:
+        detail = f"a film that covers a part of the surface is not supported; of {weight:g} it is left out"
+        read.notes.add(place.at("iridescenceFactor"), detail)
+        return
+    mask = read.texture(place, "iridescenceTexture", "linear")
+    if mask is None and weight < 1:
+        detail = f"a film that covers a part of the surface is not supported; of {weight:g} it covers all"
+        read.notes.add(place.at("iridescenceFactor"), detail)
+    thickness = _thickness(read, place, weight, mask)
+    if not isinstance(thickness, dict) and thickness == 0:
+        return
+    document["film_thickness"], document["film_ior"] = thickness, _ior(read, place)
+    read.notes.add(place.pointer, OTHER_HUES)
+
+
+def _ior(read: MaterialReader, place: JsonView) -> float:
+    ior = place.number("iridescenceIor", DEFAULT_IOR, 0)
+    nearest = min(max(ior, 1.0), LARGEST_IOR)
+    if nearest != ior:
+        detail = f"a film's ior of {ior:g} is not supported; {nearest:g} is used instead"
+        read.notes.add(place.at("iridescenceIor"), detail)
+    return nearest
+
+
+def _thickness(read: MaterialReader, place: JsonView, weight: float, mask: str | None) -> Any:
+    """In nm: a number, or a texture."""
+    texture = read.texture(place, "iridescenceThicknessTexture", "linear")
+    most = _nanometres(read, place, "iridescenceThicknessMaximum", MOST)
+    if texture is None and mask is None:
+        return most
+    least = most if texture is None else _nanometres(read, place, "iridescenceThicknessMinimum", LEAST)
+    if max(least, most) == 0:
+        return 0.0
+    if mask is None and least == 0:
+        return {"texture": texture, "channel": "g", "factor": most}
+    if mask is not None:
+        detail = "a film covers all of a texel or nothing here: all where the factor times the texture is 0.5 or more"
+        read.notes.add(place.at("iridescenceTexture"), detail)
+    return _baked(read, place, (weight, least, most), (mask, texture))
+
+
+def _nanometres(read: MaterialReader, place: JsonView, name: str, default: float) -> float:
+    found = place.number(name, default, 0)
+    if found > THICKEST:
+        read.notes.add(place.at(name), f"a film of {found:g} nm is not supported; {THICKEST:g} nm is used instead")
+    return min(found, THICKEST)
+
+
+def _baked(
+    read: MaterialReader,
+    place: JsonView,
+    numbers: tuple[float, float, float],
+    names: tuple[str | None, str | None],
+) -> dict[str, Any]:
+    """An image of thicknesses, whose factor is the largest one: a step of 8 bits is 0.4 % of that."""
+    textures = read.textures
+    infos = [place.object(name) for name in ("iridescenceTexture", "iridescenceThicknessTexture")]
+    used = [(info, name) for info, name in zip(infos, names, strict=True) if info is not None and name is not None]
+    settings = [{k: v for k, v in textures.documents[name].items() if k != "asset"} for _, name in used]
+    if settings[0] != settings[-1]:
+        detail = "this texture is placed like the film's other one, because the two are merged"
+        read.notes.add(used[0][0].pointer, detail)
+    key = f"film {numbers!r}", place.pointer
+    if key not in textures.made:
+        shown = [info if name is not None else None for info, name in zip(infos, names, strict=True)]
+        textures.made[key] = [textures.store(_image(textures, shown, numbers), used[-1][0].pointer)]
+    made = textures.add(textures.made[key][0], settings[-1], textures.file.follow(used[-1][0], "index", "textures"))
+    return {"texture": made, "factor": max(numbers[1:])}
+
+
+def _image(textures: Textures, infos: list[JsonView | None], numbers: tuple[float, float, float]) -> bytes:
+    weight, least, most = numbers
+    found = [pixels(textures, info) for info in infos]
+    size = tuple(min(max(image.size[axis] for image in found if image), LARGEST) for axis in (0, 1))
+    resized = [None if image is None else np.asarray(image.resize(size)) for image in found]
+    shares = np.arange(256, dtype=np.float32) / 255
+    bytes_of = np.rint(255 * (least + (most - least) * shares) / max(least, most)).astype(np.uint8)
+    covered = (weight * shares >= HALF).astype(np.uint8)
+    mask, thickness = resized
+    texels = np.full(size[::-1], bytes_of[255], np.uint8) if thickness is None else bytes_of[thickness[..., 1]]
+    return png(texels if mask is None else texels * covered[mask[..., 0]])

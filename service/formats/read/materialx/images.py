@@ -1,0 +1,100 @@
+"""The images that a file names, found among the files of the upload only, and read once each."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from service.formats.formats import KINDS, sniff
+from service.formats.read.image import parse_image
+from service.formats.read.materialx.trees import Unsupported
+from service.formats.read.obj.paths import is_absolute
+from service.formats.types import AssetLimits, Floats, ImageData
+
+FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
+MOST_BYTES = 1 << 30  # of the decoded images of one upload
+
+
+@dataclass
+class Images:
+    """The images of an upload. `names` are its files; `read` returns the bytes of one."""
+
+    names: Iterable[str]
+    read: Callable[[str], bytes]
+    limits: AssetLimits
+    _decoded: dict[str, ImageData] = field(default_factory=dict)
+    _bytes: int = 0
+
+    def located(self, reference: str, source: str) -> str:
+        """The path of the image that `source`, a `.mtlx` file, names. Raises Unsupported."""
+        shown = repr(reference[:100])
+        if "<" in reference:
+            raise Unsupported(f"the image {shown} has a token in its name, such as <UDIM>, which is not supported")
+        given = reference.replace("\\", "/")
+        if not given or is_absolute(given) or "://" in given:
+            raise Unsupported(f"the image {shown} is not a path inside the upload")
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(source), given))
+        known = set(self.names)
+        beside = posixpath.join(posixpath.dirname(source), posixpath.basename(path))
+        if path not in known and beside in known and ".." not in path.split("/"):
+            path = beside  # files that were dropped together have lost their folders
+        if path not in known:
+            raise Unsupported(f"the image {shown} is not in the upload; a zip has a .mtlx file and its images")
+        format = sniff(self.read(path), filename=path)
+        if format is None or KINDS[format] != "image":
+            raise Unsupported(f"the image {shown} is not in a supported format ({FORMATS})")
+        return path
+
+    def decoded(self, path: str) -> ImageData:
+        """Raises ParseError where the image is broken or too large."""
+        if path not in self._decoded:
+            data = self.read(path)
+            format = sniff(data, filename=path)
+            assert format is not None  # `located` has looked
+            image = parse_image(format, data, self.limits)
+            self._bytes += image.pixels.nbytes
+            if self._bytes > MOST_BYTES:
+                raise Unsupported(f"the images that must be decoded take more than {MOST_BYTES >> 20} MiB")
+            self._decoded[path] = image
+        return self._decoded[path]
+
+
+def texels_of(image: ImageData, rows: slice, is_srgb: bool, channels: int = 4) -> Floats:
+    """(rows * width, 3 or 4) float32 rows of texels, linear; grey images are grey, and alpha is 1 without one."""
+    pixels = image.pixels[rows].reshape(-1, image.pixels.shape[2])
+    if image.is_8bit:
+        values = (LINEAR_OF_BYTE if is_srgb else UNIT_OF_BYTE)[pixels]
+        if pixels.shape[1] == 4:
+            values[:, 3] = UNIT_OF_BYTE[pixels[:, 3]]
+    else:
+        values = pixels.astype(np.float32)
+        if is_srgb:
+            values[:, :3] = linear(values[:, :3])
+    if values.shape[1] == 1:
+        values = np.repeat(values, 3, axis=1)
+    if values.shape[1] == 3 and channels == 4:
+        values = np.concatenate([values, np.ones((len(values), 1), np.float32)], axis=1)
+    return values
+
+
+def linear(values: Floats) -> Floats:
+    """Linear values of sRGB's (IEC 61966-2-1)."""
+    low = np.maximum(values, 0)
+    return np.where(low <= 0.04045, low / 12.92, ((low + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def srgb_bytes(values: Floats) -> npt.NDArray[np.uint8]:
+    """sRGB's bytes of linear values in 0..1, by a table: a step of it is a twentieth of a byte's in the darks."""
+    return SRGB_OF_STEP[np.asarray(values * np.float32(STEPS) + np.float32(0.5), np.int32)]
+
+
+STEPS = (1 << 16) - 1
+UNIT_OF_BYTE = (np.arange(256) / 255).astype(np.float32)
+LINEAR_OF_BYTE = linear(UNIT_OF_BYTE)
+_steps = np.arange(STEPS + 1) / STEPS
+_encoded = np.where(_steps <= 0.0031308, 12.92 * _steps, 1.055 * _steps ** (1 / 2.4) - 0.055)
+SRGB_OF_STEP = np.round(255 * _encoded).astype(np.uint8)

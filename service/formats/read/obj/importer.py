@@ -1,0 +1,151 @@
+"""A zip with an OBJ file, its material libraries and textures as a scene document with meshes and images as parts.
+
+Each material's triangles become a mesh of their own. Coordinates stay as they are, and nothing else is merged or
+reordered.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from service.formats.errors import ParseError
+from service.formats.formats import text
+from service.formats.read.obj.archive import Archive
+from service.formats.read.obj.materials import Materials
+from service.formats.read.obj.mtl import MtlMaterial, read_mtl
+from service.formats.read.obj.paths import library_names, located
+from service.formats.read.obj.textures import Textures
+from service.formats.read.obj_lines import Named
+from service.formats.read.obj_mesh import MaterialMesh, read_obj, read_obj_with_materials
+from service.formats.read.polygons import Longs
+from service.formats.read.raw_mesh import RawMesh, check_raw_mesh
+from service.formats.read.scenes.framing import framed
+from service.formats.read.scenes.part_files import PartFiles
+from service.formats.read.scenes.ply_writer import ply
+from service.formats.read.scenes.rays import Placed
+from service.formats.read.scenes.room import stand_inside
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.types import AssetLimits, SceneFile
+
+MOST_MATERIALS = 10_000  # materials that faces use
+MOST_LIBRARIES = 1_000
+
+
+def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
+    """The scene of a zipped OBJ file. Raises ParseError."""
+    archive = Archive(data, limits.max_file)
+    path = _model(archive)
+    read = read_obj_with_materials(text(archive.read(path)))
+    mesh = read.mesh
+    check_raw_mesh(mesh, limits.max_triangles)
+    notes, files = Warnings(), PartFiles()
+    name = path.rpartition("/")[2]
+    for warning in mesh.warnings:
+        notes.add(name, warning)
+    library = _library(path, read.libraries, archive, notes)
+    textures = Textures(archive, files, notes, limits)
+    used = mesh.vertices[np.unique(mesh.faces)]
+    bounds = used.min(axis=0), used.max(axis=0)
+    materials = Materials(library, textures, mesh.uvs is not None, float(np.ptp(bounds, axis=0).max()), notes)
+    shapes = [
+        _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
+        for worn, which in _by_material(read)
+    ]
+    group = name[: -len(".obj")]
+    shapes = [{"name": f"{group}/{shape['material']}" if len(shapes) > 1 else group} | shape for shape in shapes]
+    document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
+    if textures.documents:
+        document["textures"] = textures.documents
+    whole = np.asarray(mesh.vertices, np.float64)
+    parts = [
+        Placed(whole, mesh.faces[which].astype(np.int32), np.eye(4), True, shape["material"])
+        for (_, which), shape in zip(_by_material(read), shapes, strict=True)
+    ]
+    if (remark := stand_inside(document, parts, bounds)) is not None:
+        notes.add(name, remark)
+    corners = [corner.tolist() for corner in bounds]
+    return SceneFile(document, files.parts, notes.document(), len(mesh.faces), False, bounds=corners)
+
+
+def read_zipped_obj(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
+    """The triangles of the OBJ file in a zip as one mesh, without its materials. Raises ParseError."""
+    archive = Archive(data, limits.max_file)
+    return read_obj(text(archive.read(_model(archive))))
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """Files by path as a zip that `read_obj_scene` takes; the same files always give the same bytes."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        for path in sorted(files):
+            archive.writestr(zipfile.ZipInfo(path), files[path])
+    return out.getvalue()
+
+
+def _model(archive: Archive) -> str:
+    """The path of the only OBJ file."""
+    found = [name for name in archive.names if name.lower().endswith(".obj")]
+    if len(found) != 1:
+        named = ", ".join(repr(name[:60]) for name in found[:3])
+        what = f"holds {len(found)} OBJ files, {named}" if found else "holds no OBJ file"
+        raise ParseError(f"the zip {what}; one is needed, with its materials and textures")
+    return found[0]
+
+
+def _library(model: str, statements: list[Named], archive: Archive, notes: Warnings) -> dict[str, MtlMaterial]:
+    """The materials of all libraries that the zip contains; the first of several with the same name."""
+    if len(statements) > MOST_LIBRARIES:
+        raise ParseError(f"it names {len(statements)} material libraries; {MOST_LIBRARIES} are allowed")
+    found: dict[str, MtlMaterial] = {}
+    read: set[str] = set()
+    for statement in statements:
+        place = f"{model.rpartition('/')[2]}:{statement.line}"
+        names = library_names(statement.name)
+        paths = [located(model, name) for name in names]
+        if len(names) > 1 and paths[0] not in archive:  # then they are several files
+            names, paths = names[1:], paths[1:]
+        else:
+            names, paths = names[:1], paths[:1]
+        for name, path in zip(names, paths, strict=True):
+            if path in read:
+                continue
+            read.add(path)
+            if path not in archive or path == model:
+                notes.add(place, f"the material library {name[:100]!r} is not there; its materials are shown grey")
+                continue
+            found = read_mtl(path, archive.read(path), notes) | found
+    return found
+
+
+def _by_material(read: MaterialMesh) -> list[tuple[str, Longs]]:
+    """The materials that triangles use, in the order in which the file first uses them, and the numbers of those
+    triangles."""
+    counts = np.bincount(read.of_triangle, minlength=len(read.materials))
+    if np.count_nonzero(counts) > MOST_MATERIALS:
+        raise ParseError(f"its faces wear {np.count_nonzero(counts)} materials; {MOST_MATERIALS} are allowed")
+    order = np.argsort(read.of_triangle, kind="stable")
+    ends = np.cumsum(counts)
+    return [(read.materials[k], order[ends[k] - counts[k] : ends[k]]) for k in np.flatnonzero(counts)]
+
+
+def _keep(files: PartFiles, mesh: RawMesh, which: Longs, pointer: str) -> dict[str, Any]:
+    """The shape, without its material, of these triangles with the vertices that they use: a mesh of their own."""
+    used, corners = np.unique(mesh.faces[which], return_inverse=True)
+    normals, uvs, colors = (None if rows is None else rows[used] for rows in (mesh.normals, mesh.uvs, mesh.colors))
+    if normals is not None and not normals.any():
+        normals = None
+    if colors is not None:
+        colors = np.clip(colors, 0, 1)
+    triangles = corners.reshape(-1, 3).astype(np.int32)
+    groups = None if mesh.groups is None or normals is not None else mesh.groups[which]
+    is_flat = groups is not None and not groups.any()
+    if groups is not None and groups.min() == groups.max():
+        groups = None
+    data = ply(mesh.vertices[used], triangles, normals, [uvs], colors, groups=groups)
+    shape = {"type": "mesh", "asset": files.add_mesh(data, pointer, mesh.vertices[used], len(triangles))}
+    return shape | ({"smooth": False} if is_flat else {})

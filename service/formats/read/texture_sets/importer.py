@@ -1,0 +1,131 @@
+"""A zip of images as a document with materials and textures, without a shape."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, field
+from typing import Any
+
+from service.formats.errors import ParseError
+from service.formats.formats import KINDS, sniff
+from service.formats.read.obj.archive import Archive
+from service.formats.read.obj.textures import FORMATS
+from service.formats.read.scenes.names import unique
+from service.formats.read.scenes.part_files import PartFiles
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.texture_sets.baking import inverted, turned
+from service.formats.read.texture_sets.names import Role
+from service.formats.read.texture_sets.real_size import Size, by_names, by_note
+from service.formats.read.texture_sets.sets import Source, TextureSet, texture_sets
+from service.formats.types import AssetLimits, SceneFile
+
+MOST_MATERIALS = 1_000
+COLOURED: tuple[Role, ...] = ("color", "emission")
+FLOATS = ("exr", "hdr")  # formats whose colours are linear
+# Members of `principled` that take one channel of an image.
+SCALARS: dict[Role, str] = {
+    "roughness": "roughness", "gloss": "roughness", "metallic": "metallic", "opacity": "alpha",
+    "specular": "specular",
+}  # fmt: skip
+RELIEF = 0.02  # metres from black to white, as of bricks or bark: images do not say
+# What a document needs beside materials; nobody sees it.
+CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
+
+
+def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
+    """The materials of a zip, each a `principled`. Raises ParseError."""
+    notes, files = Warnings(), PartFiles()
+    note = by_note(archive)
+    others = [path for path in archive.names if note is None or path != note[0]]
+    images = {path: data for path in others if (data := _image(archive, path, notes)) is not None}
+    sets = texture_sets(images, notes)
+    if not sets:
+        raise ParseError(
+            "the zip holds no OBJ file, and no images whose names say what they are, such as wood_color.png and "
+            "wood_normal.png"
+        )
+    if len(sets) > MOST_MATERIALS:
+        raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
+    textures = _Textures(images, files, limits)
+    materials = {}
+    for name, each in sets.items():
+        paths = [source.path for source in each.sources.values()]
+        textures.size = note[1] if note and len(sets) == 1 else by_names(paths)
+        materials[name] = _material(each, textures, notes)
+        if textures.size:
+            width, height = textures.size
+            shown = f"they show {width:g} x {height:g} m, and repeat so for texture coordinates in metres"
+            notes.add(note[0] if note and len(sets) == 1 else paths[0], shown)
+    document = {
+        "version": 1, "camera": CAMERA, "materials": materials, "textures": textures.documents, "shapes": [],
+    }  # fmt: skip
+    return SceneFile(document, files.parts, notes.document(), 0, False)
+
+
+def _image(archive: Archive, path: str, notes: Warnings) -> bytes | None:
+    data = archive.read(path)
+    format = sniff(data, filename=path) if data else None
+    if format is None or KINDS[format] != "image":
+        notes.add(path, f"not an image in a supported format ({FORMATS}); left out")
+        return None
+    return data
+
+
+@dataclass
+class _Textures:
+    """The textures of all materials; `documents` are the finished ones by name."""
+
+    images: dict[str, bytes]
+    files: PartFiles
+    limits: AssetLimits
+    size: Size | None = None  # of what the images of the present material show
+    documents: dict[str, dict[str, Any]] = field(default_factory=dict)
+    _names: dict[tuple[str, str, str], str] = field(default_factory=dict)
+
+    def use(self, source: Source, role: Role) -> str:
+        """The name of the texture that shows an image in a role."""
+        data = self.images[source.path]
+        way = {"gloss": "roughness", "normal": "turned"}.get(role, "") if _is_baked(source, role) else ""
+        space = "srgb" if role in COLOURED and sniff(data) not in FLOATS else "linear"
+        key = source.path, f"{way}{source.channel if way else ''}", space
+        coloured = source.path, "", "srgb"
+        if source.channel == "a" and not way and coloured in self._names:
+            return self._names[coloured]  # alpha is linear in any texture
+        if key not in self._names:
+            if role == "gloss":
+                data = inverted(data, source.channel, self.limits)
+            elif way:
+                data = turned(data, self.limits)
+            stem = posixpath.splitext(posixpath.basename(source.path))[0]
+            name = unique(f"{stem} as roughness" if role == "gloss" else stem, self.documents)
+            asset = self.files.add(data, source.path)
+            scale = {"scale": [float(f"{1 / side:.6g}") for side in self.size]} if self.size else {}
+            self.documents[name] = {"asset": asset, "color_space": space, **scale}
+            self._names[key] = name
+        return self._names[key]
+
+
+def _is_baked(source: Source, role: Role) -> bool:
+    return role == "gloss" or (role == "normal" and bool(source.meaning.directx))
+
+
+def _material(images: TextureSet, textures: _Textures, notes: Warnings) -> dict[str, Any]:
+    out: dict[str, Any] = {"type": "principled"}
+    for role, source in images.sources.items():
+        name = textures.use(source, role)
+        if role == "color":
+            out["base_color"] = {"texture": name}
+        elif role == "emission":
+            out["emission"] = {"texture": name}
+        elif role == "normal":
+            out["normal_map"] = {"texture": name}
+        elif role == "height":
+            out["height"] = {"texture": name, "scale": RELIEF}
+            shown = "with displacement, else the normal map shows them" if "normal" in images.sources else "as bumps"
+            notes.add(source.path, f"heights, shown {shown}; {RELIEF:g} m from black to white are assumed")
+            if "normal" in images.sources:
+                out["height"]["shading"] = False  # it is of the same relief
+        else:
+            channel = {} if role == "gloss" or not source.channel else {"channel": source.channel}
+            out[SCALARS[role]] = {"texture": name, **channel}
+    return out

@@ -1,0 +1,79 @@
+"""The images of each material: which is taken where several are of one thing, and what is said of the others."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.texture_sets.names import Meaning, Role, meaning
+
+# Things that no parameter has: they are left out, with a warning.
+LEFT_OUT: dict[Role, str] = {
+    "occlusion": "ambient occlusion is left out: the light that reaches a corner is traced",
+    "other": "there is no parameter for such an image; it is left out",
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """An image for one role, or the channel of one."""
+
+    path: str
+    meaning: Meaning
+    channel: str  # "" for the whole image
+
+
+@dataclass
+class TextureSet:
+    """The images of one material, by role."""
+
+    sources: dict[Role, Source] = field(default_factory=dict)
+
+
+def texture_sets(paths: Iterable[str], notes: Warnings) -> dict[str, TextureSet]:
+    """The sets by material, in the order of their names; paths lead to images. What is not taken is noted."""
+    named: dict[str, list[tuple[str, Meaning]]] = {}
+    for path in sorted(paths):
+        found = meaning(posixpath.splitext(posixpath.basename(path))[0])
+        if found is None:
+            notes.add(path, "the file's name does not say what the image is of; it is left out")
+        elif found.udim:
+            notes.add(path, "tiles (UDIM) are not supported; the image is left out")
+        else:
+            named.setdefault(_material(path, found), []).append((path, found))
+    sets = {name: _chosen(images, notes) for name, images in named.items()}
+    return {name: each for name, each in sets.items() if each.sources}
+
+
+def _material(path: str, found: Meaning) -> str:
+    """The name of its material: what is left of the file's name, else that of its folder."""
+    return found.material or posixpath.basename(posixpath.dirname(path)) or "material"
+
+
+def _chosen(images: list[tuple[str, Meaning]], notes: Warnings) -> TextureSet:
+    out = TextureSet()
+    for path, found in sorted(images, key=lambda image: _rank(image[1])):
+        taken = False
+        for role, channel in found.channels.items():
+            if role in LEFT_OUT:
+                if not found.packed:
+                    notes.add(path, LEFT_OUT[role])
+                    taken = True
+                continue
+            target = out.sources.setdefault(role, Source(path, found, channel))
+            taken = taken or target.path == path
+        if not taken:
+            others = {out.sources[role].path for role in found.channels if role in out.sources}
+            notes.add(path, f"another image of this is used: {', '.join(sorted(others))}")
+    if "gloss" in out.sources and "roughness" in out.sources:
+        unused = out.sources.pop("gloss")
+        if unused.path not in {each.path for each in out.sources.values()}:
+            notes.add(unused.path, f"another image of this is used: {out.sources['roughness'].path}")
+    return out
+
+
+def _rank(found: Meaning) -> tuple[bool, bool]:
+    """Separate images come before packed ones, and normals for OpenGL before those for DirectX."""
+    return found.packed, bool(found.directx)

@@ -1,0 +1,139 @@
+"""The parameters of one surface: constants, and images by the nodes that read them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd.networks import MOST_STEPS, Node
+from service.formats.read.usd.pictures import materialx_picture, picture
+from service.formats.read.usd.textures import Role, Textures
+
+# Nodes of MaterialX that hand on their input, or a channel of it.
+PASSED = ("normalmap", "convert_", "dot_", "constant_", "extract_", "separate", "swizzle_")
+
+
+class Reader:
+    """The parameters of one surface. `charts` and `is_colored` say what of its meshes it uses; `unit` is how many
+    metres one of the stage's units has."""
+
+    def __init__(self, surface: Node, textures: Textures, unit: float, notes: Warnings) -> None:
+        self.surface, self.textures, self.unit, self.notes = surface, textures, unit, notes
+        self.charts: list[str] = []
+        self.is_colored = False
+        self._unread = surface  # the node of MaterialX at which reading ended
+
+    def color(self, name: str, default: tuple[float, ...], most: float = 1.0) -> Any:
+        """A colour within 0..`most`, or a reference to a texture."""
+        found = self.surface.input(name, default)
+        if isinstance(found, Node):
+            read = self._read(found, "color", default)
+            if isinstance(read, dict):
+                return read
+            found = read
+        if isinstance(found, int | float):
+            found = (float(found),) * 3
+        if not isinstance(found, tuple) or len(found) < 3:
+            return list(default)
+        return [min(max(value, 0.0), most) for value in found[:3]]
+
+    def scalar(self, name: str, default: float, most: float = 1.0) -> Any:
+        """A number within 0..`most`, or a reference to a texture."""
+        found = self.surface.input(name, default)
+        if isinstance(found, Node):
+            read = self._read(found, "scalar", (default,) * 4)
+            if isinstance(read, dict):
+                return read
+            found = read[0]
+        return min(max(float(found), 0.0), most) if isinstance(found, int | float) else default
+
+    def normal(self, name: str) -> dict[str, Any] | None:
+        found = self.surface.input(name)
+        if not isinstance(found, Node):
+            return None
+        read = self._read(found, "normal", ())
+        return read if isinstance(read, dict) else None
+
+    def constants(self, name: str, default: tuple[float, ...], most: float) -> tuple[float, ...]:
+        """A colour that a texture cannot stand for."""
+        found = self.surface.input(name, default)
+        if isinstance(found, Node):
+            words = " ".join(f"{each:g}" for each in default)
+            self.notes.add(self.surface.at(name), f"a texture is not supported here; {words} is used instead")
+            found = default
+        return tuple(min(max(value, 0.0), most) for value in found)
+
+    def constant(self, name: str, default: float, most: float = 1.0, least: float = 0.0) -> float:
+        """A number that a texture cannot stand for."""
+        found = self.surface.input(name, default)
+        if isinstance(found, Node):
+            self.notes.add(self.surface.at(name), f"a texture is not supported here; {default:g} is used instead")
+        return min(max(self.surface.number(name, default), least), most)
+
+    def _materialx(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
+        """What a node of MaterialX is; None where it computes what is not read."""
+        kind = node.kind.removeprefix("ND_")
+        self._unread = node
+        if steps > MOST_STEPS:
+            return None
+        if kind.startswith(("image_", "tiledimage_")):
+            found = self.textures.use(materialx_picture(node, role, self.notes), role, self.charts)
+            default = node.value("default", 0.0)
+            plain = default if isinstance(default, tuple) else (float(default),) * 3
+            return found or (plain if node.has("default") else None)
+        if kind.startswith(PASSED):
+            inner = node.input("in" if not kind.startswith("constant_") else "value")
+        elif kind.startswith("multiply_"):
+            return self._product(node, role, steps)
+        else:
+            return None
+        if kind.startswith("normalmap") and node.number("scale", 1.0) != 1:
+            self.notes.add(node.at("scale"), "the scale of a normal map is not read")
+        if not isinstance(inner, Node):
+            return inner if isinstance(inner, tuple) else (float(inner),) * 3 if isinstance(inner, float) else None
+        output = node.output if node.output in "rgb" else node.output.removeprefix("out")
+        if kind.startswith(("extract", "separate", "swizzle")):
+            output = output if kind.startswith("separate") else "rgba"[int(node.number("index", 0)) % 4]
+            split = self._materialx(inner, role, steps + 1)
+            return {**split, "channel": output} if isinstance(split, dict) and output in "rgba" else split
+        return self._materialx(inner, role, steps + 1)
+
+    def _product(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
+        """An image times a constant."""
+        sides = [node.input(name, 1.0) for name in ("in1", "in2")]
+        nodes = [side for side in sides if isinstance(side, Node)]
+        if len(nodes) != 1:
+            return None
+        found = self._materialx(nodes[0], role, steps + 1)
+        value = next(side for side in sides if not isinstance(side, Node))
+        factors = value[:3] if isinstance(value, tuple) else (value,) * 3
+        if found is None or min(factors) < 0:
+            return None
+        if not isinstance(found, dict):
+            return tuple(a * b for a, b in zip(found[:3], factors, strict=False))
+        factor = factors[0] if role != "color" or len(set(factors)) == 1 else list(factors)
+        return {**found, "factor": factor} if "factor" not in found else None
+
+    def _read(self, node: Node, role: Role, default: tuple[float, ...]) -> dict[str, Any] | tuple[float, ...]:
+        """A reference to the texture that a node is, or its fallback, or `default`."""
+        if node.kind == "UsdUVTexture":
+            found = self.textures.use(picture(node, self.notes), role, self.charts)
+            fallback = node.numbers("fallback", (0.0, 0.0, 0.0, 1.0))
+            return found or (fallback if node.has("fallback") else default)
+        if node.kind.startswith("UsdPrimvarReader_float"):
+            varname = str(node.value("varname", ""))
+            if varname == "displayColor" and role == "color":
+                self.is_colored = True
+                return (1.0, 1.0, 1.0)
+            self.notes.add(node.pointer, f"values of the primvar {varname[:40]!r} are not supported in a material")
+            fallback = node.value("fallback", default)
+            return fallback if isinstance(fallback, tuple) else default
+        if node.kind.startswith("ND_"):
+            self._unread = node
+            read = self._materialx(node, role, 0)
+            if read is not None:
+                return read
+            node = self._unread
+        what = node.kind[:60] or "a node without a kind"
+        self.notes.add(node.pointer, f"{what} is not supported in a material; the parameter has its default")
+        return default

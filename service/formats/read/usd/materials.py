@@ -1,0 +1,98 @@
+"""Materials that meshes are bound to -> the document's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from pxr import Usd, UsdShade
+
+from service.formats.read.scenes.names import unique
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd.material_reader import Reader
+from service.formats.read.usd.materialx import SURFACES, materialx_surface
+from service.formats.read.usd.networks import Node, surface_of
+from service.formats.read.usd.preview_surface import preview_surface
+from service.formats.read.usd.textures import Textures
+
+PREVIEW = "UsdPreviewSurface"
+GREY = 0.8  # albedo of a mesh without a material and without a colour
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A material of the document, and what it takes from the meshes that have it."""
+
+    name: str
+    charts: tuple[str, ...] = ()  # primvars with texture coordinates, at most two
+    is_colored: bool = False
+
+
+@dataclass
+class Materials:
+    textures: Textures
+    time: Usd.TimeCode
+    unit: float  # metres per unit of the stage
+    notes: Warnings
+    documents: dict[str, dict[str, Any]] = field(default_factory=dict)
+    _bound: dict[str, Bound] = field(default_factory=dict)
+    _colors: dict[tuple[float, ...], Bound] = field(default_factory=dict)
+
+    def of(self, prim: Usd.Prim) -> UsdShade.Material | None:
+        """The material that is bound to a mesh, or to a part of one."""
+        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        return material if material else None
+
+    def key(self, material: UsdShade.Material | None) -> str:
+        """Equal for the same material in all instances of a prim."""
+        if material is None:
+            return ""
+        prim = material.GetPrim()
+        return str((prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath())
+
+    def use(self, material: UsdShade.Material) -> Bound | None:
+        """The material in the document; None, with a warning, where it has no surface that is read."""
+        key = self.key(material)
+        if key not in self._bound:
+            found = self._read(material)
+            if found is None:
+                return None
+            document, read = found
+            name = unique(material.GetPrim().GetName(), self.documents)
+            self.documents[name] = document
+            self._bound[key] = Bound(name, tuple(read.charts), read.is_colored)
+        return self._bound[key]
+
+    def plain(self, color: list[float] | None, is_colored: bool) -> Bound:
+        """A material for what has none: in the one colour of a mesh, in those of its vertices, or grey."""
+        shown = (1.0,) * 3 if is_colored else tuple(color or (GREY,) * 3)
+        key = (*shown, float(is_colored))
+        if key not in self._colors:
+            base = "vertex colours" if is_colored else "colour" if color else "default"
+            name = unique(base, self.documents)
+            self.documents[name] = {"type": "principled", "base_color": list(shown), "roughness": 0.5}
+            self._colors[key] = Bound(name, (), is_colored)
+        return self._colors[key]
+
+    def _read(self, material: UsdShade.Material) -> tuple[dict[str, Any], Reader] | None:
+        """MaterialX first, which says more; the preview's surface where it loses less."""
+        preview, rich = surface_of(material, "", self.time), surface_of(material, "mtlx", self.time)
+        if rich is None and preview is not None and preview.kind in SURFACES:
+            preview, rich = None, preview
+        fallback = preview if preview is not None and preview.kind == PREVIEW else None
+        if rich is not None and rich.kind in SURFACES:
+            lost = Warnings()
+            read = Reader(rich, self.textures, self.unit, lost if fallback else self.notes)
+            document = materialx_surface(read)
+            if fallback is None or not lost.document():
+                return document, read
+            detail = "the MaterialX surface has what is not supported; its UsdPreviewSurface is shown instead"
+            self.notes.add(rich.pointer, detail)
+        if fallback is not None:
+            read = Reader(fallback, self.textures, self.unit, self.notes)
+            return preview_surface(read), read
+        other: Node | None = rich or preview
+        what = f"its surface is {other.kind[:60] or 'code'}" if other else "it has no surface of these"
+        detail = f"the material is not supported ({what}); UsdPreviewSurface, standard_surface and OpenPBR are"
+        self.notes.add(str(material.GetPath()), detail)
+        return None

@@ -1,0 +1,150 @@
+"""A USD file as layers in memory, whose references lead nowhere but into the upload.
+
+Each layer is anonymous: it has no place on the disk from which a path could start. What a layer refers to is looked
+up in the package (a .usdz), and every path to a layer there is replaced by that layer's own identifier before
+anything is composed; a path that leads elsewhere is removed. So USD never resolves a path that a stranger wrote.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from dataclasses import dataclass, field
+
+from pxr import Sdf, Tf, Usd, UsdUtils
+
+from service.formats.errors import ParseError
+from service.formats.formats import CRATE, USD_LAYERS, USD_TEXT, text
+from service.formats.read.obj.archive import Archive
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.types import AssetLimits
+
+INSIDE, OUTSIDE = "inside:", "outside:"  # before the path of a file that is not a layer, in the package or not
+SHADERS = (".mdl", ".osl", ".oso", ".glslfx", ".mtlx")  # code, of which the importer of materials speaks
+DEEPEST = 256  # prims within prims: the library calls itself for each, and 20 000 overflow its stack
+# Braces, and what may hold some that mean nothing: texts, asset paths, comments.
+BRACES = re.compile(
+    rb"""
+    \"{3} (?:\\.|[^\\])*? \"{3} | \" (?:\\.|[^\"\\\n])* \" | '{3} (?:\\.|[^\\])*? '{3} | ' (?:\\.|[^'\\\n])* '
+    | @@@ .*? @@@ | @ [^@\n]* @ | \# [^\n]* | [{}]
+    """,
+    re.DOTALL | re.VERBOSE,
+)
+ALONE = "which is not part of this one; save the scene as a .usdz"
+
+
+@dataclass
+class Package:
+    """The layers of a file, and the images beside them. Raises ParseError where a layer cannot be read."""
+
+    data: bytes | memoryview
+    limits: AssetLimits
+    notes: Warnings
+    _layers: dict[str, Sdf.Layer] = field(default_factory=dict)
+    _unread: list[str] = field(default_factory=list)  # names of layers whose paths are still those of the file
+
+    def __post_init__(self) -> None:
+        self._files: Archive | None = None
+        root = ""
+        if bytes(self.data[:4]) == b"PK\x03\x04":
+            self._files = Archive(self.data, self.limits.max_file)
+            root = next((name for name in self._files.names if name.lower().endswith(USD_LAYERS)), "")
+            if not root:
+                raise ParseError("the package holds no layer, a .usd, .usda or .usdc file")
+        self.root = self._layer(root)
+        while self._unread:
+            name = self._unread.pop()
+            UsdUtils.ModifyAssetPaths(self._layers[name], lambda path, name=name: self._replaced(name, path))
+
+    def stage(self) -> Usd.Stage:
+        """The composed scene."""
+        try:
+            return Usd.Stage.Open(self.root, Usd.Stage.LoadAll)
+        except Tf.ErrorException as error:
+            raise ParseError(f"its layers cannot be composed ({_said(error)})") from None
+
+    def file(self, path: str) -> bytes | None:
+        """The bytes of a file that a layer names, by the path that its attribute has now; None for one outside."""
+        if self._files is None or not path.startswith(INSIDE):
+            return None
+        return self._files.read(path.removeprefix(INSIDE))
+
+    def _layer(self, name: str) -> Sdf.Layer:
+        if name not in self._layers:
+            data = self.data if self._files is None else self._files.read(name)
+            self._layers[name] = _read(data, name)
+            self._unread.append(name)
+        return self._layers[name]
+
+    def _replaced(self, layer: str, path: str) -> str:
+        """What stands in a layer instead of a path of its author."""
+        found = self._located(layer, path)
+        lower = path.lower()
+        if found is not None and found.lower().endswith(USD_LAYERS):
+            identifier: str = self._layer(found).identifier
+            return identifier
+        if found is not None and not lower.endswith(SHADERS):
+            return INSIDE + found
+        if lower.endswith((*USD_LAYERS, ".usdz", ".abc")) or "[" in path:
+            self.notes.add(layer or path, f"it refers to another file, {path[:100]!r}, {ALONE}; that is left out")
+            return ""
+        if lower.endswith(".mtlx"):
+            self.notes.add(layer or path, f"the MaterialX file {path[:100]!r} is not read; what is in it is left out")
+            return ""
+        return OUTSIDE + path[:200]
+
+    def _located(self, layer: str, path: str) -> str | None:
+        """The name of a file of the package: relative to the layer, else to the package's root."""
+        if self._files is None or "\0" in path or path.startswith("/"):
+            return None
+        near = posixpath.normpath(posixpath.join(posixpath.dirname(layer), path))
+        return next((name for name in (near, posixpath.normpath(path)) if name in self._files), None)
+
+
+def _read(data: bytes | memoryview, name: str) -> Sdf.Layer:
+    """A layer without a place, from its bytes. The tag of an anonymous layer says its format, no more."""
+    binary = bytes(data[: len(CRATE)]) == CRATE
+    layer = Sdf.Layer.CreateAnonymous(".usdc" if binary else ".usda")
+    try:
+        if binary:
+            _fill(layer, data)
+        else:
+            words = text(bytes(data))
+            if not words.startswith(USD_TEXT):
+                raise ParseError("it is no USD layer: it begins neither with #usda nor with PXR-USDC", name)
+            if _depth(words) > DEEPEST:
+                raise ParseError(f"its prims are nested more than {DEEPEST} deep", name)
+            layer.ImportFromString(words.decode("utf-8", "replace"))
+    except Tf.ErrorException as error:
+        raise ParseError(f"the layer cannot be read ({_said(error)})", name) from None
+    return layer
+
+
+def _depth(words: bytes) -> int:
+    """How deep the braces of a text layer are nested."""
+    depth = deepest = 0
+    for found in BRACES.finditer(words):
+        depth += {b"{": 1, b"}": -1}.get(found[0], 0)
+        deepest = max(deepest, depth)
+    return deepest
+
+
+def _fill(layer: Sdf.Layer, data: bytes | memoryview) -> None:
+    """Read a binary layer, which the library takes from a file only: from one in memory, through its descriptor."""
+    file = os.memfd_create("sunbox-layer", os.MFD_CLOEXEC)
+    try:
+        view = memoryview(data)
+        while view:
+            view = view[os.write(file, view) :]
+        if not layer.Import(f"/proc/self/fd/{file}"):
+            raise ParseError("the binary layer cannot be read")
+    finally:
+        os.close(file)
+
+
+def _said(error: Tf.ErrorException) -> str:
+    """What the library said of a file, without the names of its own sources."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    said = next((line.rpartition(" : '")[2].rstrip("'") for line in lines if " : '" in line), "it is broken")
+    return re.sub(r" matching pxr\S+", "", said)[:200]

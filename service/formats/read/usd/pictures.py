@@ -1,0 +1,100 @@
+"""Nodes that read images: UsdUVTexture, and the images of MaterialX."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd.networks import Node
+from service.formats.read.usd.textures import Picture, Role
+
+WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "clamp"}
+ADDRESSES = {"periodic": "repeat", "mirror": "mirror", "clamp": "clamp", "constant": "clamp"}
+LINEAR = ("", "raw", "data", "lin_rec709", "lin_rec709_scene", "Raw", "none", "auto")
+
+
+def picture(node: Node, notes: Warnings) -> Picture:
+    """The image of a UsdUVTexture."""
+    wraps = [str(node.value(name, "useMetadata")) for name in ("wrapS", "wrapT")]
+    wrap = [WRAPS.get(one, "repeat") for one in wraps]
+    if wrap[0] != wrap[1]:
+        notes.add(node.at("wrapT"), f"{wraps[1][:20]} in t beside {wraps[0][:20]} in s is not supported; s is used")
+    if "black" in wraps:
+        notes.add(node.at("wrapS"), "black outside of an image is not supported; its edge goes on instead")
+    spaces = {"raw": "linear", "sRGB": "srgb"}
+    space: Any = spaces.get(str(node.value("sourceColorSpace", "auto")), "auto")
+    chart = "st"
+    placing: tuple[tuple[str, Any], ...] = ()
+    at = node.input("st")
+    steps = 0
+    while isinstance(at, Node) and at.kind == "UsdTransform2d":
+        if placing or steps:
+            notes.add(at.pointer, "a second UsdTransform2d is not supported; it is ignored")
+        else:
+            placing = _placing(at)
+        at, steps = at.input("in"), steps + 1
+        if steps > 8:
+            break
+    if isinstance(at, Node) and at.kind.startswith("UsdPrimvarReader_float2"):
+        chart = str(at.value("varname", "st")) or "st"
+    elif isinstance(at, Node):
+        notes.add(at.pointer, f"{at.kind[:60]} as texture coordinates is not supported; st is used instead")
+    return Picture(
+        str(node.value("file", "")), node.pointer, node.output, space, wrap[0],
+        node.numbers("scale", (1.0,) * 4), node.numbers("bias", (0.0,) * 4), chart, placing,
+    )  # fmt: skip
+
+
+def _placing(node: Node) -> tuple[tuple[str, Any], ...]:
+    """A UsdTransform2d: scale, then rotation, then translation, as the document's texture has them."""
+    scale, offset = node.numbers("scale", (1.0, 1.0)), node.numbers("translation", (0.0, 0.0))
+    rotation = node.number("rotation", 0.0)
+    given: list[tuple[str, Any]] = []
+    if scale != (1.0, 1.0):
+        given.append(("scale", list(scale)))
+    if rotation:
+        given.append(("rotation", rotation))
+    if offset != (0.0, 0.0):
+        given.append(("offset", list(offset)))
+    return tuple(given)
+
+
+def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
+    """An image of MaterialX, whose values are linear unless its colour space says otherwise."""
+    named = str(node.shader.GetInput("file").GetAttr().GetColorSpace()) if node.has("file") else ""
+    if named not in LINEAR and not named.startswith(("srgb", "g22_rec709")):
+        notes.add(
+            node.at("file"), f"the colour space {named[:40]!r} is not supported; linear Rec.709 is used instead"
+        )
+    space: Any = "srgb" if named.startswith(("srgb", "g22_rec709")) and role == "color" else "linear"
+    addresses = [ADDRESSES.get(str(node.value(f"{axis}addressmode", "periodic")), "repeat") for axis in "uv"]
+    if addresses[0] != addresses[1]:
+        notes.add(node.at("vaddressmode"), "two address modes are not supported; that of u is used for both")
+    chart, placing = _coordinates(node.input("texcoord"), notes)
+    if "tiledimage" in node.kind:
+        tiling, moved = node.numbers("uvtiling", (1.0, 1.0)), node.numbers("uvoffset", (0.0, 0.0))
+        if placing and (tiling != (1.0, 1.0) or moved != (0.0, 0.0)):
+            notes.add(node.pointer, "a tiled image under a second transform is not supported; the tiling is ignored")
+        elif tiling != (1.0, 1.0) or moved != (0.0, 0.0):
+            placing = (("scale", list(tiling)), ("offset", [-moved[0], -moved[1]]))
+    output = "a" if node.output == "outa" else "rgb"
+    return Picture(
+        str(node.value("file", "")), node.pointer, output, space, addresses[0], chart=chart, placing=placing
+    )
+
+
+def _coordinates(at: Any, notes: Warnings) -> tuple[str, tuple[tuple[str, Any], ...]]:
+    """The primvar with texture coordinates, and how they are transformed: place2d divides by its scale."""
+    placing: tuple[tuple[str, Any], ...] = ()
+    if isinstance(at, Node) and at.kind.startswith("ND_place2d"):
+        scale, offset = at.numbers("scale", (1.0, 1.0)), at.numbers("offset", (0.0, 0.0))
+        if at.number("rotate", 0.0) or at.numbers("pivot", (0.0, 0.0)) != (0.0, 0.0) or not all(scale):
+            notes.add(at.pointer, "the rotation and the pivot of place2d are not supported; they are ignored")
+        scale = tuple(1 / one if one else 1.0 for one in scale)
+        placing = (("scale", list(scale)), ("offset", [-offset[0], -offset[1]]))
+        at = at.input("texcoord")
+    if isinstance(at, Node) and at.kind.startswith("ND_geompropvalue"):
+        return str(at.value("geomprop", "st")) or "st", placing
+    if isinstance(at, Node) and not at.kind.startswith("ND_texcoord"):
+        notes.add(at.pointer, f"{at.kind[:60]} as texture coordinates is not supported; st is used instead")
+    return "st", placing

@@ -1,0 +1,131 @@
+"""The things of a stage that are shown, each with the places where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from service.formats.errors import ParseError
+from service.formats.read.scenes.placements import MOST_SHAPES
+from service.formats.read.scenes.warnings import Warnings
+from service.formats.types import Doubles
+
+MOST_PRIMS = 300_000  # visited, each in every instance of it
+DEEPEST = 16  # instancers whose prototypes are instancers
+HIDDEN = ("proxy", "guide")  # purposes: stand-ins for the viewport, and helpers
+LONGEST_NAME = 400  # characters of a name in the document
+
+
+@dataclass(frozen=True)
+class Item:
+    """A prim under each of `worlds` (k, 4, 4), which take columns; `name` is for people."""
+
+    prim: Usd.Prim
+    worlds: Doubles
+    name: str
+
+    @property
+    def pointer(self) -> str:
+        return str(self.prim.GetPath())
+
+
+class Walk:
+    def __init__(self, stage: Usd.Stage, time: Usd.TimeCode, notes: Warnings) -> None:
+        self._stage, self._time, self._notes = stage, time, notes
+        self._visited = 0
+        self.root = placed(stage)
+
+    def items(self) -> list[Item]:
+        """All prims but groups, in the order of the file. Raises ParseError where there are too many."""
+        children = self._children(self._stage.GetPseudoRoot())
+        return [item for prim in children for item in self._below(prim, self.root[None], True, 0)]
+
+    def _below(self, top: Usd.Prim, worlds: Doubles, own: bool, depth: int) -> Iterator[Item]:
+        """A prim and all that is below it. `own`: its own transform counts; that of a prototype's root does not."""
+        stack = [(top, worlds, own, "default")]
+        while stack:
+            prim, above, moves, purpose = stack.pop()
+            self._visited += 1
+            if self._visited > MOST_PRIMS:
+                raise ParseError(f"the scene has more than the {MOST_PRIMS} prims allowed, counted in each instance")
+            here = above
+            if prim.IsA(UsdGeom.Imageable):
+                seen = UsdGeom.Imageable(prim)
+                if seen.GetVisibilityAttr().Get(self._time) == "invisible":
+                    continue
+                purpose = self._purpose(seen, purpose)
+                if purpose in HIDDEN:
+                    continue
+                if moves and prim.IsA(UsdGeom.Xformable):
+                    local = UsdGeom.Xformable(prim)
+                    if local.GetResetXformStack():
+                        above = self.root[None]
+                    here = above @ _matrix(local.GetLocalTransformation(self._time))
+            if prim.IsA(UsdGeom.PointInstancer):
+                yield from self._instances(UsdGeom.PointInstancer(prim), here, depth)
+                continue
+            if prim.GetTypeName():
+                yield Item(prim, here, str(prim.GetPath())[1:][:LONGEST_NAME])
+            stack += [(child, here, True, purpose) for child in reversed(self._children(prim))]
+
+    def _instances(self, instancer: UsdGeom.PointInstancer, worlds: Doubles, depth: int) -> Iterator[Item]:
+        """What an instancer places: its prototypes are not shown by themselves."""
+        pointer = str(instancer.GetPath())
+        if depth >= DEEPEST:
+            raise ParseError(f"instancers are nested more than {DEEPEST} deep, or in a circle", pointer)
+        which = instancer.GetProtoIndicesAttr().Get(self._time)
+        targets = instancer.GetPrototypesRel().GetForwardedTargets()
+        if not which or not targets:
+            return
+        numbers = np.array(which)
+        if numbers.min() < 0 or numbers.max() >= len(targets):
+            detail = f"names prototype {numbers.max()}; there are {len(targets)}"
+            raise ParseError(detail, f"{pointer}.protoIndices")
+        if len(numbers) * len(worlds) > MOST_SHAPES:
+            raise ParseError(f"places {len(numbers) * len(worlds)} instances; {MOST_SHAPES} are allowed", pointer)
+        matrices = instancer.ComputeInstanceTransformsAtTime(
+            self._time, self._time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+        )
+        if len(matrices) != len(numbers):
+            self._notes.leave_out(pointer, "its positions and protoIndices differ in number; it is left out")
+            return
+        kept = np.array(instancer.ComputeMaskAtTime(self._time) or np.ones(len(numbers)), bool)
+        placed = np.array([np.array(one) for one in matrices]).transpose(0, 2, 1)
+        for k, target in enumerate(targets):
+            prim = self._stage.GetPrimAtPath(target)
+            rows = placed[kept & (numbers == k)]
+            if not prim or not len(rows):
+                continue
+            every = (worlds[:, None] @ rows[None]).reshape(-1, 4, 4)
+            for item in self._below(prim, every, False, depth + 1):
+                if len(item.worlds) > MOST_SHAPES:
+                    raise ParseError(f"places more than the {MOST_SHAPES} instances allowed", pointer)
+                yield Item(item.prim, item.worlds, f"{pointer[1:]}/{item.prim.GetName()}"[:LONGEST_NAME])
+
+    def _purpose(self, seen: UsdGeom.Imageable, above: str) -> str:
+        """A prim's own purpose, where it or its schema says one; else that of what is above it."""
+        own = seen.GetPurposeAttr()
+        if own.HasAuthoredValue():
+            return str(own.Get())
+        return above
+
+    def _children(self, prim: Usd.Prim) -> list[Usd.Prim]:
+        return list(prim.GetFilteredChildren(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+
+
+def placed(stage: Usd.Stage) -> Doubles:
+    """(4, 4): from the stage's units and axes to metres with +Y up."""
+    matrix = np.eye(4)
+    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+        matrix[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    matrix[:3, :3] *= UsdGeom.GetStageMetersPerUnit(stage)
+    return matrix
+
+
+def _matrix(row_vectors: Any) -> Doubles:
+    """A matrix of USD, which multiplies rows, for columns."""
+    return np.array(row_vectors, np.float64).T

@@ -1,0 +1,19 @@
+"""The server's process: what a request means, from the network to the disk.
+
+app         what is served: the routes and the editor's files
+launch      how a server starts
+state       what the routes share
+routes      the endpoints
+http        between the network and the routes
+requests    from what a caller wrote to what the renderer takes
+renders     renders asked for over REST
+batches     renders of one scene that differ along axes
+callbacks   URLs that are told of the ends of renders and batches
+verdict     whether two pictures differ beyond noise
+streams     scenes that are edited while they are watched
+assets      uploaded assets, and files beside a scene
+storage     the data folder
+operation   what an operator watches
+first_frame  the first frame of a scene that no client asked for: for readiness, and to warm up
+file_formats  the formats that are read and written
+"""

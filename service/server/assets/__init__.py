@@ -1,0 +1,15 @@
+"""Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path.
+
+store         uploaded assets
+rendered      uploaded pictures that Sunbox rendered, with what their noise is
+folder        the files of the store, each written whole or not at all
+folder_totals  the disk space of all assets, updated with each change
+integrity     whether the bytes on the disk still match their hash
+local_files   assets that are files beside a scene
+posing        a scene's file with other materials, or at a time of its animation
+"""
+
+from service.server.assets.local_files import FileAssets
+from service.server.assets.store import AssetStore
+
+__all__ = ["AssetStore", "FileAssets"]

@@ -1,0 +1,73 @@
+"""Each request gets an id, under which it is logged and counted."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections.abc import Callable
+from secrets import token_hex
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.problems import Internal, ServiceError
+from service.system.logs.formatters import bound
+
+GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
+ID_BYTES = 9
+ASKED_ALL_THE_TIME = ("/healthz", "/readyz", "/metrics")
+
+Heard = Callable[[str, str, int, float], None]  # method, route, status, seconds
+
+log = logging.getLogger(__name__)
+
+
+class Requests:
+    """ASGI middleware: gives each request an id, logs and counts it, and answers unexpected exceptions."""
+
+    def __init__(self, app: ASGIApp, *, refuse: Callable[[ServiceError], ASGIApp], heard: Heard) -> None:
+        self._app = app
+        self._refuse = refuse
+        self._heard = heard
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            return await self._app(scope, receive, send)
+        given = Headers(scope=scope).get("x-request-id", "")
+        id = given if GIVEN_ID.fullmatch(given) else token_hex(ID_BYTES)
+        began, status = time.perf_counter(), 0
+
+        async def sending(message: Message) -> None:
+            nonlocal status
+            if message["type"] in ("http.response.start", "websocket.accept"):
+                status = message.get("status", 101)
+                message["headers"] = list(message.get("headers", ()))
+                MutableHeaders(scope=message)["x-request-id"] = id
+            await send(message)
+
+        with bound(request=id):
+            try:
+                await self._app(scope, receive, sending)
+            except Exception:
+                log.exception("request failed", {"path": _path(scope)})
+                if scope["type"] == "http" and status == 0:
+                    await self._refuse(Internal())(scope, receive, sending)
+            finally:
+                self._tell(scope, status, time.perf_counter() - began)
+
+    def _tell(self, scope: Scope, status: int, seconds: float) -> None:
+        method = scope.get("method", "WEBSOCKET")
+        self._heard(method, getattr(scope.get("route"), "path", ""), status, seconds)
+        level = logging.DEBUG if scope["path"] in ASKED_ALL_THE_TIME else logging.INFO
+        log.log(
+            level,
+            "answered",
+            {"method": method, "path": _path(scope), "status": status, "ms": round(1e3 * seconds, 1)},
+        )
+
+
+def _path(scope: Scope) -> str:
+    """The path, percent-encoded, so that it cannot end a line; without the query, which may hold a session's id."""
+    raw: bytes = scope.get("raw_path") or b""
+    return raw.partition(b"?")[0].decode("ascii", "replace")[:500]

@@ -1,0 +1,221 @@
+"""The slots of SUNBOX_MAX_RUNNING: which renders run, which wait, and which give way to others."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+from itertools import chain, islice
+
+from service.server.renders.job import Job
+from service.server.renders.preemption import LITTLE_S, SOON_S, WAIT_S, giving_way
+from service.server.renders.recent import Recent
+from service.server.renders.turns import Turns
+from service.system.background import Background, reported
+
+AGAIN_S = 5.0  # between two attempts to begin a render that waits for memory, the disk or a renderer
+LOOK_S = 1.0  # between two looks at who waits
+PATIENCE_S = 30.0  # for which others pass a render that waits for memory; then, for as long, only small ones do
+AT_ONCE = 64  # renders that are looked at in one go, which takes a millisecond
+FEW = 8  # of one owner
+SMALL = 4  # so many small renders in every slot would take all memory
+
+log = logging.getLogger(__name__)
+
+
+class Slots:
+    """For the event loop. A render has a slot and its memory, or neither of them."""
+
+    def __init__(self, most: int, ended: Callable[[Job], None], clock: Callable[[], float] = time.monotonic) -> None:
+        """`ended` is called with each render whose slot is free for good."""
+        self.waiting: Turns[Job] = Turns()
+        self.closing = False
+        self._most = most
+        self._ended = ended
+        self._clock = clock
+        self._running: dict[asyncio.Task[None], Job] = {}
+        self._recent = Recent(clock)
+        self._since: dict[Job, float] = {}  # when each that waits came into line
+        self._lacking: dict[Job, float] = {}  # those that something is missing for, since when, the longest first
+        self._tried: dict[Job, None] = {}  # of these, those that are not to be tried just now, the next ones first
+        self._tried_at = 0.0
+        self._claim: Job | None = None  # the one that others are giving way to
+        self._leaving: set[Job] = set()  # these others
+        self._timer: asyncio.TimerHandle | None = None
+        self._tasks = Background()
+
+    @property
+    def running(self) -> list[Job]:
+        """In the order in which they began."""
+        return list(self._running.values())
+
+    def add(self, job: Job) -> None:
+        """Have it wait; `dispatch` starts it when its turn comes."""
+        self.waiting.add(job)
+        self._since[job] = self._clock()
+
+    def remove(self, job: Job) -> bool:
+        """Whether it was waiting."""
+        self._lacking.pop(job, None)
+        self._tried.pop(job, None)
+        self._since.pop(job, None)
+        return self.waiting.remove(job)
+
+    def close(self) -> None:
+        """Start nothing any more."""
+        self.closing = True
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def dispatch(self) -> None:
+        """Start what may run."""
+        while not self.closing and self._free > 0:
+            running = Counter(job.owner for job in self._running.values())
+            job = self.waiting.next(running, self._fits, self._may_have_one)
+            if job is None:
+                break
+            self._start(job)
+        self._look_later()
+
+    @property
+    def _free(self) -> int:
+        """Slots that nobody has, without the one that others give way for."""
+        stay = sum(job not in self._leaving for job in self._running.values())
+        return self._most - max(len(self._running), stay + (self._claim is not None))
+
+    def _may_have_one(self, owner: str) -> bool:
+        """Whether an owner may have a slot that is free. While several owners have renders here, or had within the
+        last minute, the last one is for owners who have none: they would wait until somebody has given way."""
+        running = {job.owner for job in self._running.values()}
+        if self._free > 1 or not owner or owner not in running:
+            return True
+        return len({*running, *self.waiting.owners, *self._recent.owners}) == 1
+
+    def _look(self) -> None:
+        self._timer = None
+        with reported("look at who waits", lambda _: self._look_later()):
+            if self._clock() - self._tried_at >= AGAIN_S:
+                self._try_again()
+            self.dispatch()
+            if self._claim is None and not self.closing:
+                self._make_way()
+
+    def _look_later(self) -> None:
+        if self._timer is None and len(self.waiting) and not self.closing:
+            self._timer = asyncio.get_running_loop().call_later(LOOK_S, self._look)
+
+    def _try_again(self) -> None:
+        for job in list(islice(self._tried, AT_ONCE)):
+            del self._tried[job]
+        self._tried_at = self._clock()
+
+    def _start(self, job: Job) -> None:
+        self._lacking.pop(job, None)
+        self._since.pop(job, None)
+        self._recent.begins(job)
+        task = self._tasks.start("render", job.run(), job.rendering.died)
+        self._running[task] = job
+        task.add_done_callback(self._ran)
+
+    def _ran(self, task: asyncio.Task[None]) -> None:
+        job = self._running.pop(task)
+        self._recent.ends(job)
+        if job in self._leaving and not job.finished.is_set():
+            return
+        if job.finished.is_set() or self.closing:
+            self._try_again()  # it gave its memory back
+            self._ended(job)
+        else:
+            self.add(job)
+            self._lack(job)
+        self.dispatch()
+
+    def _lack(self, job: Job) -> None:
+        self._lacking.setdefault(job, self._clock())
+        self._tried[job] = None
+
+    def _fits(self, job: Job) -> bool:
+        """Whether it may begin now; its memory is counted then."""
+        if job in self._tried or self._held_back(job) or not self._in_share(job):
+            return False
+        if job.reserve():
+            return True
+        self._lack(job)
+        return False
+
+    def _held_back(self, job: Job) -> bool:
+        """Whether it would take memory that another one has waited for: so no stream of renders starves a large one.
+
+        Only for half of the time, as what that one waits for may be endless."""
+        first = next(iter(self._lacking), job)
+        waited = self._clock() - self._lacking.get(first, self._clock())
+        return first is not job and int(waited / PATIENCE_S) % 2 == 1 and job.memory_share > 1 / (SMALL * self._most)
+
+    def _in_share(self, job: Job) -> bool:
+        """Whether it may have a slot that it cannot give back: of these an owner leaves half to the others."""
+        if job.lasting or not job.owner:
+            return True
+        fixed = Counter(each.owner for each in self._running.values() if not each.lasting)
+        own, others = fixed[job.owner], fixed.total() - fixed[job.owner]
+        return own == 0 or 2 * own < self._most - others
+
+    def _make_way(self) -> None:
+        """Have others give way to a render that has waited for long, if that is fair."""
+        now, running = self._clock(), self.running
+        counts = Counter(job.owner for job in running)
+        owners = sorted(self.waiting.owners, key=lambda owner: counts[owner])
+        for waiting in islice(chain.from_iterable(map(self._firsts, owners)), AT_ONCE):
+            if not (self._waited_enough(waiting, now - self._since[waiting]) and self._in_share(waiting)):
+                continue
+            free = self._free if self._may_have_one(waiting.owner) else 0
+            chosen = giving_way(waiting, running, free, waiting.lacks)
+            if chosen:
+                self._claim, self._leaving = waiting, set(chosen)
+                self._tasks.start("hand-over of slots", self._give_way(waiting, chosen), self._gave_up)
+                return
+
+    def _waited_enough(self, waiting: Job, waited_s: float) -> bool:
+        """Whether others may give way to it. They do so soon where its client has nothing, and has had little lately
+        or lacks a slot alone, of which another client has several."""
+        if not SOON_S <= waited_s < WAIT_S:
+            return waited_s >= WAIT_S
+        counts = Counter(job.client for job in self._running.values())
+        if counts[waiting.client]:
+            return False
+        has_several = max(counts.values(), default=0) > 1
+        return self._recent.seconds(waiting.client) < LITTLE_S or (has_several and not waiting.lacks)
+
+    def _firsts(self, owner: str) -> list[Job]:
+        """Those of an owner for which others may give way: the first that gave way itself, and some that begin."""
+        line = self.waiting.line(owner)
+        began = [job for job in line[:1] if job.began]
+        return began + list(islice((job for job in line if not job.began), FEW))
+
+    async def _give_way(self, waiting: Job, chosen: list[Job]) -> None:
+        tasks = {job: task for task, job in self._running.items() if job in self._leaving}
+        gave = await asyncio.gather(*(job.give_way() for job in chosen))
+        for job, gives in zip(chosen, gave, strict=True):
+            if gives:
+                await asyncio.wait([tasks[job]])
+                log.info("a render gave way to another one", {"id": job.id[:6], "to": waiting.id[:6]})
+        await asyncio.sleep(0)  # for `_ran`
+        self._handed_over(waiting)
+
+    def _gave_up(self, error: Exception) -> None:
+        """An error of the server ended the hand-over: whoever gave its slot back by then comes back into line."""
+        if self._claim is not None:
+            self._handed_over(self._claim)
+
+    def _handed_over(self, waiting: Job) -> None:
+        left = self._leaving - set(self._running.values())
+        self._claim, self._leaving = None, set()
+        self._tried.pop(waiting, None)
+        if waiting in self.waiting and not self.closing and self._free > 0 and self._fits(waiting):
+            self.waiting.take(waiting)
+            self._start(waiting)
+        for job in left:
+            if not job.finished.is_set():
+                self.add(job)
+        self.dispatch()

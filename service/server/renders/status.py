@@ -1,0 +1,60 @@
+"""The status and the errors of a render, as callers see them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import partial
+from typing import Any
+
+from service.document.quality import forecast
+from service.ipc.leases import undivided
+from service.ipc.messages import Failed
+from service.problems import FieldError, Internal, InvalidDocument, ServiceError
+from service.server.renders.ordered import Ordered
+from service.server.renders.store.record import Order, Outcome
+
+
+def snapshot(render: Ordered, kernel: bool = False) -> Callable[[], dict[str, Any]]:
+    """What makes the status of a render as it is now, for any thread."""
+    return partial(status, render.order, render.outcome, render.renderers.tracing(render.task), kernel)
+
+
+def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False) -> dict[str, Any]:
+    """As JSON; `renderers` is how many trace it. With `kernel`, what its kernel was compiled for as well: the flags'
+    names are longer than all the rest."""
+    progress = outcome.progress
+    known: dict[str, Any] = {
+        "id": order.id,
+        "state": outcome.state,
+        "label": order.label,
+        "priority": order.priority,
+        "created": iso(order.created_at),
+        "started": iso(outcome.started_at),
+        "ended": iso(outcome.ended_at),
+        "reason": outcome.reason,
+        "samples": progress.samples,
+        "noise": progress.noise,
+        "elapsed_s": progress.elapsed_s,
+        "setup_s": outcome.setup_s,
+        "eta_s": None if outcome.state in ("cancelled", "failed") else progress.eta_s,
+        "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s),
+        "warnings": outcome.warnings,
+        "renderers": renderers,
+        "not_divided": undivided(order.settings.adaptive, order.settings.time_limit),
+        "settings": order.settings.document(),
+    }
+    if kernel:
+        known["kernel"] = outcome.kernel
+    return known if outcome.problem is None else known | {"problem": outcome.problem}
+
+
+def iso(seconds: float | None) -> str | None:
+    """A time since 1970 in UTC, by RFC 3339; None where it is not known."""
+    if not seconds:
+        return None
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def error_of(failed: Failed) -> ServiceError:
+    return InvalidDocument([FieldError("/scene", failed.detail)]) if failed.refused else Internal(failed.detail)

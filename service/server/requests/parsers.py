@@ -1,0 +1,104 @@
+"""What JSON bodies are read as, by name; and the classes that a reading is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import is_dataclass
+from functools import cache
+from typing import Any, Literal, get_args, get_type_hints
+
+from service.config import Config
+from service.document import Scene, load_json
+from service.document.material.conversion import Converted
+from service.server.requests.batch_request import parse_batch
+from service.server.requests.bsdf_request import BsdfRequest, parse_albedo, parse_terms, parse_values
+from service.server.requests.compare_request import parse_compare
+from service.server.requests.conversion_request import parse_conversion
+from service.server.requests.export_request import parse_export
+from service.server.requests.request_parser import ParsedRequest, RequestParser
+from service.server.storage.documents import CheckedDocument, checked
+
+Body = bytearray | memoryview
+Kind = Literal[
+    "render", "keyed_render", "batch", "request", "scene", "scenes", "materials", "bsdf", "albedo", "terms",
+    "conversion", "comparison", "export",
+]  # fmt: skip
+
+
+def _render(config: Config, body: Body) -> ParsedRequest:
+    return RequestParser(config).render(body)
+
+
+def _keyed_render(config: Config, body: Body) -> ParsedRequest:
+    return RequestParser(config).render(body, keyed=True)
+
+
+def _request(config: Config, body: Body) -> ParsedRequest:
+    return RequestParser(config).request(body)
+
+
+def _scene(config: Config, body: Body) -> Scene:
+    return RequestParser(config).scene(load_json(body))
+
+
+def _saved_scene(config: Config, body: Body) -> CheckedDocument:
+    return checked("scenes", load_json(body), config)
+
+
+def _saved_material(config: Config, body: Body) -> CheckedDocument:
+    return checked("materials", load_json(body), config)
+
+
+def _bsdf(config: Config, body: Body) -> BsdfRequest:
+    return parse_values(body)
+
+
+def _albedo(config: Config, body: Body) -> BsdfRequest:
+    return parse_albedo(body)
+
+
+def _terms(config: Config, body: Body) -> BsdfRequest:
+    return parse_terms(body)
+
+
+def _conversion(config: Config, body: Body) -> Converted:
+    return parse_conversion(body)
+
+
+# What can be asked of a process that parses large bodies, by name. Which classes that process may send,
+# `answer_classes` derives from what each says that it returns.
+PARSERS: dict[Kind, Callable[[Config, Body], Any]] = {
+    "render": _render,
+    "keyed_render": _keyed_render,
+    "batch": parse_batch,
+    "request": _request,
+    "scene": _scene,
+    "scenes": _saved_scene,
+    "materials": _saved_material,
+    "bsdf": _bsdf,
+    "albedo": _albedo,
+    "terms": _terms,
+    "conversion": _conversion,
+    "comparison": parse_compare,
+    "export": parse_export,
+}
+
+
+@cache
+def answer_classes() -> frozenset[type]:
+    """The classes that PARSERS return, and those of their fields, as the annotations say. Of a document's models only
+    the outermost are among them: all are classes of `service.document`."""
+    found = set[type]()
+    for parse in PARSERS.values():
+        _collect(get_type_hints(parse)["return"], found)
+    return frozenset(found)
+
+
+def _collect(annotation: Any, found: set[type]) -> None:
+    """Add the service's own classes in an annotation."""
+    if isinstance(annotation, type) and annotation.__module__.startswith("service.") and annotation not in found:
+        found.add(annotation)
+        for hint in get_type_hints(annotation).values() if is_dataclass(annotation) else ():
+            _collect(hint, found)
+    for part in get_args(annotation):
+        _collect(part, found)

@@ -1,0 +1,248 @@
+"""Two sides become a verdict: groups of samples are taken while it is undecided, up to what their settings allow."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from service.colorimetry import LUMINANCE
+from service.document.quality import ResolvedSettings
+from service.server.verdict.decision import Decision, decide
+from service.server.verdict.evidence import Array, Estimate, Evidence, Sum
+from service.server.verdict.figures import Differing, Figures, differing, figures
+from service.server.verdict.maps import drawn
+from service.server.verdict.regions import Region, p_map, regions
+from service.server.verdict.schedule import USUAL_SAMPLES, Schedule, of_one_document, of_two_documents
+from service.system.executors import comparing
+from service.views import MapKind
+
+# How light is found: estimator, sampler, and the depth from which paths may end.
+Ways = tuple[str, str, int]
+
+
+def ways_of(settings: ResolvedSettings) -> Ways:
+    return settings.estimator, settings.sampler, settings.roulette_depth
+
+
+@dataclass(frozen=True)
+class Still:
+    """A picture that is there, and gets no more samples."""
+
+    estimate: Estimate
+    seed: int
+    ways: Ways
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        height, width = self.estimate.mean.shape[:2]
+        return width, height
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Samples that were taken, and the seconds that this took."""
+
+    estimate: Estimate
+    elapsed_s: float
+
+
+@dataclass(frozen=True)
+class Source:
+    """A document, of which samples can be taken: `render(settings)`. Raises what rendering raises."""
+
+    settings: ResolvedSettings
+    render: Callable[[ResolvedSettings], Awaitable[Taken]]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.settings.render_width, self.settings.render_height
+
+    @property
+    def ways(self) -> Ways:
+        return ways_of(self.settings)
+
+    @property
+    def samples(self) -> int:
+        return self.settings.max_samples or USUAL_SAMPLES
+
+
+Side = Still | Source
+# Called with the samples of each pixel that are taken, and those that may be taken at most.
+Told = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    different: bool
+    p_value: float
+    figures: Figures
+    differing: Differing
+    regions: list[Region]
+    samples: tuple[int, int]  # of a and b
+    p: Array  # a `p_map`
+    a: Array  # mean radiance
+    b: Array
+    alpha: float
+
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "different": self.different,
+            "p_value": self.p_value,
+            **asdict(self.figures),
+            "differing": asdict(self.differing),
+            "samples": {"a": self.samples[0], "b": self.samples[1]},
+            "regions": [asdict(region) for region in self.regions],
+        }
+
+    def picture(self, kind: MapKind) -> np.ndarray:
+        """(height, width, 3) bytes."""
+        return drawn(kind, self.a, self.b, self.p, self.alpha)
+
+
+async def compare(a: Side, b: Side, confidence: float, told: Told = lambda taken, most: None) -> Verdict:
+    """The verdict on two sides of the same size. Cancelled, it ends what it renders."""
+    alpha = 1.0 - confidence
+    if isinstance(a, Source) and isinstance(b, Source):
+        evidence, decision = await _of_two_documents(a, b, alpha, told)
+    elif isinstance(a, Source) and isinstance(b, Still):
+        evidence, decision = await _of_one_document(a, b, "a", alpha, told)
+    elif isinstance(a, Still) and isinstance(b, Source):
+        evidence, decision = await _of_one_document(b, a, "b", alpha, told)
+    else:
+        assert isinstance(a, Still) and isinstance(b, Still)
+        evidence = await comparing(partial(Evidence, a.estimate, b.estimate, a.ways == b.ways))
+        decision = await comparing(partial(decide, evidence))
+    return await comparing(partial(_verdict, evidence, decision, alpha))
+
+
+def same(source: Source, confidence: float) -> Verdict:
+    """The verdict on a document and itself, of which nothing is rendered."""
+    width, height = source.size
+    nothing = np.zeros((height, width, 3))
+    equal = Figures(mean_difference=0.0, rmse=0.0, psnr=None, flip=0.0, ssim=1.0)
+    return Verdict(
+        False,
+        1.0,
+        equal,
+        Differing(0.0, 0.0),
+        [],
+        (0, 0),
+        np.ones((height, width)),
+        nothing,
+        nothing,
+        1.0 - confidence,
+    )
+
+
+class _Limits:
+    """What ends a comparison beside its samples: the settings' time and noise."""
+
+    def __init__(self, *sources: Source) -> None:
+        limits = [each.settings.time_limit for each in sources]
+        self._left_s = min((limit for limit in limits if limit is not None), default=math.inf)
+        self._noises = [each.settings.target_noise for each in sources]
+
+    def settings(self, settings: ResolvedSettings, seed: int, samples: int) -> ResolvedSettings:
+        """Those of a group of samples. The verdict is on what was rendered, whatever a denoiser would make of it; and
+        every pixel gets as many samples, as those of adaptive sampling depend on what they found."""
+        left = None if math.isinf(self._left_s) else max(self._left_s, 0.001)
+        return replace(
+            settings, seed=seed, max_samples=samples, time_limit=left, target_noise=None, adaptive=False,
+            denoise=False,
+        )  # fmt: skip
+
+    def spend(self, seconds: float) -> None:
+        self._left_s -= seconds
+
+    def reached(self, *sums: Sum) -> bool:
+        quiet = all(
+            noise is not None and _noise(each) <= noise for noise, each in zip(self._noises, sums, strict=True)
+        )
+        return self._left_s <= 0 or quiet
+
+
+async def _of_two_documents(a: Source, b: Source, alpha: float, told: Told) -> tuple[Evidence, Decision]:
+    schedule, limits = of_two_documents(min(a.samples, b.samples), a.settings.seed), _Limits(a, b)
+    evidence, best = None, Decision()
+    for done, group in enumerate(schedule.groups):
+        told(*schedule.share(done))
+        settings = (limits.settings(each.settings, group.seed, group.samples) for each in (a, b))
+        first, second = await _together(*(each.render(own) for each, own in zip((a, b), settings, strict=True)))
+        limits.spend(max(first.elapsed_s, second.elapsed_s))
+        if evidence is None:
+            evidence = await comparing(partial(Evidence, first.estimate, second.estimate, a.ways == b.ways))
+        else:
+            await comparing(partial(evidence.add, first.estimate, second.estimate))
+        ends = limits.reached(evidence.a, evidence.b)
+        if group.look or ends:
+            best = await _looked(evidence, schedule, best)
+            if best.p_value < alpha or ends:
+                break
+    assert evidence is not None
+    return evidence, best
+
+
+async def _of_one_document(
+    source: Source, still: Still, side: str, alpha: float, told: Told
+) -> tuple[Evidence, Decision]:
+    known = still.estimate.samples
+    schedule, limits = of_one_document(source.samples, known, still.seed), _Limits(source)
+    evidence, best = None, Decision()
+    for done, group in enumerate(schedule.groups):
+        told(*schedule.share(done))
+        taken = await source.render(limits.settings(source.settings, group.seed, group.samples))
+        limits.spend(taken.elapsed_s)
+        if evidence is None:
+            pair = (taken.estimate, still.estimate) if side == "a" else (still.estimate, taken.estimate)
+            evidence = await comparing(partial(Evidence, *pair, source.ways == still.ways))
+        else:
+            await comparing(partial(evidence.add_to, side, taken.estimate))
+        best = await _looked(evidence, schedule, best)
+        if best.p_value < alpha or limits.reached(evidence.a if side == "a" else evidence.b):
+            break
+    assert evidence is not None
+    return evidence, best
+
+
+async def _looked(evidence: Evidence, schedule: Schedule, best: Decision) -> Decision:
+    """The better of the earlier looks and one more."""
+    found = await comparing(partial(decide, evidence, schedule.looks))
+    return found if found.p_value <= best.p_value else best
+
+
+async def _together(*renders: Awaitable[Taken]) -> list[Taken]:
+    """What all of them give; if one fails or this is cancelled, the others are cancelled."""
+    tasks = [asyncio.ensure_future(each) for each in renders]
+    try:
+        return await asyncio.gather(*tasks)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def _noise(side: Sum) -> float:
+    """The root of the mean variance of a pixel's luminance over the mean luminance, as the renderer's meter says
+    it; infinite where one sample does not tell."""
+    mean, variance = float((side.mean @ LUMINANCE).mean()), float((side.variance @ LUMINANCE**2).mean())
+    if side.samples < 2:
+        return math.inf
+    return math.sqrt(variance) / mean if mean > 0 else 0.0
+
+
+def _verdict(evidence: Evidence, decision: Decision, alpha: float) -> Verdict:
+    a, b = evidence.a.mean, evidence.b.mean
+    different = decision.p_value < alpha
+    p = p_map(decision.levels, evidence.shape, alpha)
+    return Verdict(
+        different, decision.p_value, figures(a, b), differing(a, b, p, alpha), regions(p, alpha) if different else [],
+        (evidence.a.samples, evidence.b.samples), p, a, b, alpha,
+    )  # fmt: skip
