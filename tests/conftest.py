@@ -39,7 +39,7 @@ LONG_FILES = (
     "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "shaders/test_lobes.py",
     "service/test_one_client.py", "service/exports/test_gltf_out.py", "service/rendering/test_checkpoints.py",
     # of `make long-test`
-    "bench/test_first_frames.py", "bench/test_hemisphere.py", "service/bench/test_scale.py", "bench/test_soak.py",
+    "bench/test_first_frames.py", "bench/test_hemisphere.py", "bench/test_scale.py", "bench/test_soak.py",
     "bench/test_profile.py", "service/rendering/cluster/test_cluster.py", "service/rendering/cluster/test_nodes.py",
     "service/bench/test_device.py",
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """`sunbox bench speed | gpu | tradeoff | seeds | scale`: a table; `-o` also writes the figures.
 
-The benchmarks that developers alone need are not part of the product: `python -m tests.bench`.
+The last three write pages of the source and need a checkout, as do those that developers alone need: `python -m
+tests.bench`.
 """
 
 from __future__ import annotations
@@ -9,11 +10,14 @@ import argparse
 import json
 import math
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from service.cli import BadInput, Failed, files
+
+ROOT = Path(__file__).parents[2]
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -22,11 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
     measures = {
         "speed": _speed,
         "gpu": _gpu,
-        "tradeoff": _tradeoff,
-        "seeds": _seeds,
-        "scale": _scale,
     }
-    return measures[arguments.what](arguments)
+    return measures.get(arguments.what, _laboratory)(arguments)
 
 
 def _speed(arguments: argparse.Namespace) -> int:
@@ -61,69 +62,12 @@ def _gpu(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _tradeoff(arguments: argparse.Namespace) -> int:
-    refuse_quick_publishing(arguments)
-    output = output_path(arguments.output)
-    from gpu import GpuError
-    from service.bench import tradeoff, tradeoff_report
-
-    try:
-        options = tradeoff.Options(quick=arguments.quick)
-        document = tradeoff.measure(options, progress)
-    except ImportError as error:
-        raise Failed(f"the price list needs the extra `bench`: {error}") from None
-    except GpuError as error:
-        raise Failed(str(error)) from None
-    print(tradeoff_report.markdown(document))
-    write_figures(output, document)
-    if arguments.publish:
-        tradeoff_report.publish(document)
-    return 0
-
-
-def _seeds(arguments: argparse.Namespace) -> int:
-    refuse_quick_publishing(arguments)
-    if arguments.publish:
-        need_matplotlib("--publish")
-    output = output_path(arguments.output)
-    from gpu import GpuError
-    from service.bench.seeds import page, report, run
-
-    try:
-        document, pictures = run.measure(arguments.quick, progress)
-    except GpuError as error:
-        raise Failed(str(error)) from None
-    print(page.markdown(document))
-    write_figures(output, document)
-    if arguments.publish:
-        report.publish(document, pictures)
-    return 0
-
-
-def _scale(arguments: argparse.Namespace) -> int:
-    most = arguments.simulate
-    if most is not None and not 1 <= most <= 1024:
-        raise BadInput(f"--simulate {most}: from 1 to 1024 renderers can be simulated")
-    if arguments.publish and (most is None or arguments.quick):
-        raise BadInput("--publish: needs --simulate N, and not --quick, whose figures mean nothing")
-    if arguments.publish:
-        need_matplotlib("--publish")
-    output = output_path(arguments.output)
-    from gpu import GpuError
-    from service.bench import scale, scale_report
-
-    try:
-        document = {"measured": scale.measure(scale.Options(arguments.runs, arguments.quick), progress)}
-        print(scale_report.measured_table(document["measured"]))
-        if most is not None:
-            document["simulated"] = scale.simulate(most, arguments.quick, progress)
-            print(scale_report.speedup_table(document["simulated"]))
-    except (GpuError, scale.NotMeasured) as error:
-        raise Failed(str(error)) from None
-    write_figures(output, document)
-    if arguments.publish:
-        scale_report.publish(**document)
-    return 0
+def _laboratory(arguments: argparse.Namespace) -> int:
+    """The maintainers' benchmarks, which write pages of the source, are not installed."""
+    if not (ROOT / "tests" / "bench" / "laboratory.py").is_file():
+        raise BadInput(f"bench {arguments.what}: needs a checkout of the source; `speed` and `gpu` do not")
+    code: int = import_module("tests.bench.laboratory").run(arguments)
+    return code
 
 
 def refuse_quick_publishing(arguments: argparse.Namespace) -> None:

@@ -1,6 +1,16 @@
 """Benchmarks that developers run, besides those of the product: `python -m tests.bench NAME`.
 
 __main__        the command line
+laboratory      `sunbox bench tradeoff | seeds | scale`, which write pages of the source
+tradeoff        the price list: the error that each setting costs which saves time
+tradeoff_scenes  the scenes of `tradeoff`
+tradeoff_report  the price list as a page for people
+pareto          from measured curves to prices
+seeds           the experiments of the programs that Sunbox grew out of
+scale           what several renderers gain
+scale_model     a model of a divided render, simulated and in closed form
+scale_costs     the costs that the model is fed with
+scale_report    tables, a figure, and a section of docs/scaling.md
 compare         this checkout beside an earlier revision
 compare_run     one side of `compare`
 faults          which faults of a list the tests find

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
 
 from gpu import Renderer, SceneArrays
 from gpu.accel import bvh
+from gpu.layout import LEAF_BIT, TREELET_BIT
 from service.bench.device import stage
 from service.bench.device.stage import Options, Row
-from service.bench.seeds.spheres import in_one_order
 
 SCENES = ("sphere-field", "generated-mesh", stage.MESH)
 TREELETS, WHOLE = "treelets", "no treelets"
@@ -51,3 +54,15 @@ def measure(name: str, options: Options) -> list[Row]:
             {"scene": name, "tree": way, "node_bytes": loaded[way].arrays.nodes.nbytes, "rate": rate}
             for way, rate in rates.items()
         ]
+
+
+def in_one_order(arrays: SceneArrays) -> SceneArrays:
+    """The same tree, walked by all rays in the order in which it was built, whatever their directions."""
+    count = arrays.node_count
+    nodes = arrays.nodes.copy()
+    inner = nodes["link"][:count] & np.uint32(LEAF_BIT | TREELET_BIT) == 0
+    for octant in range(1, 8):
+        order = nodes[:count].copy()
+        order["link"][inner] += np.uint32(octant * count)  # where the walk goes on counts in the whole array
+        nodes[octant * count : (octant + 1) * count] = order
+    return replace(arrays, nodes=nodes)

@@ -10,11 +10,11 @@ import numpy as np
 
 from gpu import SceneArrays
 from service.bench.scenes import BenchAssets, cases, mesh_on_plane, standing
-from service.bench.tradeoff_scenes import BUMPS, PLANKS, TradeoffAssets
 from service.document import parse_scene, presets
 from service.formats import Assets, MeshData
 from service.pack import pack
 from tests.bench import peer_scenes
+from tests.bench.tradeoff_scenes import BUMPS, PLANKS, TradeoffAssets
 
 Document = dict[str, Any]
 MAX_BOUNCES = 8

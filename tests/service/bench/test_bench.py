@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 from service.bench import growth, latency, machine, scenes, speed, timing
+from service.cli import bench
 from service.cli.program import main
 from service.document import parse_scene
 from service.pack import pack
@@ -99,3 +100,12 @@ def test_command_prints_a_table_and_keeps_the_figures(
     assert "12.35" in said and "+30.0" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2
+
+
+@pytest.mark.parametrize("what", ["tradeoff", "seeds", "scale"])
+def test_what_writes_pages_of_the_source_says_that_it_needs_a_checkout(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bench, "ROOT", tmp_path)
+    assert main(["bench", what, "--quick"]) == 2
+    assert f"bench {what}: needs a checkout" in capsys.readouterr().err

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from service.bench.seeds.page import NAME, Row, markdown
-from service.bench.seeds.spheres import NONE, OURS, UNORDERED
+from tests.bench.seeds.page import NAME, Row, markdown
+from tests.bench.seeds.spheres import NONE, OURS, UNORDERED
 
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from service.bench import scale, scale_report
-from service.bench.scale_model import BLOCK, Costs, Network, Work, limits, simulate, speedup, steady_speedup
 from service.cli.program import main
 from service.worker.division.home import EACH
+from tests.bench import scale, scale_report
+from tests.bench.scale_model import BLOCK, Costs, Network, Work, limits, simulate, speedup, steady_speedup
 from tests.marks import seldom
 
 FREE = Network(1e15)

@@ -18,12 +18,13 @@ import numpy as np
 
 from gpu import Renderer, RenderSettings, denoise
 from gpu.analysis.metering import noise_meter_off
-from service.bench import machine, pareto
-from service.bench.tradeoff_scenes import Case, TradeoffAssets, cases
+from service.bench import machine
 from service.colorimetry import LUMINANCE
 from service.document import parse_scene
 from service.document.quality import PRESETS
 from service.pack import pack
+from tests.bench import pareto
+from tests.bench.tradeoff_scenes import Case, TradeoffAssets, cases
 
 FULL = 512  # pixels a side of the pictures whose seconds are reported
 EQUAL_SAMPLES = 64  # of the plain render: errors at equal time are at the time that it takes

@@ -13,9 +13,10 @@ import numpy as np
 from gpu import SceneArrays
 from gpu.accel import bvh
 from gpu.accel.sah import Split
-from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_KIND_SHIFT, LEAF_MAX_COUNT, TREELET_BIT, ShapeKind
-from service.bench.seeds.stage import Document, Stage, sheet, shown
+from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_KIND_SHIFT, LEAF_MAX_COUNT, ShapeKind
+from service.bench.device.trees import in_one_order
 from service.document import presets
+from tests.bench.seeds.stage import Document, Stage, sheet, shown
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 8000, 10_000)
 WIDTH, HEIGHT, BOUNCES = 480, 272, 4
@@ -114,15 +115,3 @@ def with_tree(arrays: SceneArrays, split: Split) -> tuple[SceneArrays, float]:
         node_scale=tree.scale, bvh_kinds=frozenset({ShapeKind.SPHERE}), large={},
     )  # fmt: skip
     return changed, 1e3 * statistics.median(seconds)
-
-
-def in_one_order(arrays: SceneArrays) -> SceneArrays:
-    """The same tree, walked by all rays in the order in which it was built, whatever their directions."""
-    count = arrays.node_count
-    nodes = arrays.nodes.copy()
-    inner = nodes["link"][:count] & np.uint32(LEAF_BIT | TREELET_BIT) == 0
-    for octant in range(1, 8):
-        order = nodes[:count].copy()
-        order["link"][inner] += np.uint32(octant * count)  # where the walk goes on counts in the whole array
-        nodes[octant * count : (octant + 1) * count] = order
-    return replace(arrays, nodes=nodes)

@@ -13,9 +13,9 @@ import pytest
 
 from gpu import Renderer
 from gpu.analysis.unbounded import UnboundedRenderer
-from service.bench.seeds import blur, bounces, reflection, report, run, samples, spheres
-from service.bench.seeds.stage import GAP, Stage, sheet, shown
 from service.cli.program import main
+from tests.bench.seeds import blur, bounces, reflection, report, run, samples, spheres
+from tests.bench.seeds.stage import GAP, Stage, sheet, shown
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from service.bench.seeds.spheres import NONE, OURS, SPLITS, UNORDERED
+from tests.bench.seeds.spheres import NONE, OURS, SPLITS, UNORDERED
 
 NAME = "experiments"  # the name of the page, and of the folder with its pictures
 Row = dict[str, Any]

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from service.bench.scale_model import BLOCK
 from service.worker.division.home import EACH
 from service.worker.division.ledger import AHEAD_BYTES, LEASE_S, MOST_BYTES, PIXEL_BYTES
+from tests.bench.scale_model import BLOCK
 
 DOCS = Path(__file__).parents[2] / "docs"
 BEGIN, END = "<!-- scale: written by `sunbox bench scale --publish` -->", "<!-- scale end -->"

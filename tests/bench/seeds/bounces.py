@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from service.bench.seeds.stage import Document, Stage, sheet, shown
 from service.document import presets
+from tests.bench.seeds.stage import Document, Stage, sheet, shown
 
 ROOMS = ("cornell-boxes", "cornell-spheres", "cornell-glossy", "cornell-open")
 SIZE = 384

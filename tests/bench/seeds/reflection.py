@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gpu import SceneArrays, Steps
-from service.bench.seeds.stage import Document, Stage, sheet, shown
 from service.document import parse_scene, presets
 from service.pack import pack_material
 from service.problems import InvalidDocument
+from tests.bench.seeds.stage import Document, Stage, sheet, shown
 
 ROUGHNESS = 0.35
 ALPHA = ROUGHNESS**2

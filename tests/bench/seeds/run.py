@@ -11,8 +11,8 @@ import numpy as np
 from gpu import Renderer
 from gpu.analysis.unbounded import UnboundedRenderer
 from service.bench import machine
-from service.bench.seeds import blur, bounces, reflection, samples, spheres
-from service.bench.seeds.stage import Stage
+from tests.bench.seeds import blur, bounces, reflection, samples, spheres
+from tests.bench.seeds.stage import Stage
 
 
 def measure(quick: bool, told: Callable[[str], None]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.bench import pareto, tradeoff, tradeoff_report
-from service.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
 from service.cli.program import main
 from service.document import parse_scene, quality
 from service.pack import pack
+from tests.bench import pareto, tradeoff, tradeoff_report
+from tests.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -78,7 +78,7 @@ def test_the_published_list_is_whole() -> None:
     for name, preset in quality.priced().items():
         assert quality.PRESETS[name].items() <= preset.items()
         assert "noise" in preset["gives_up"] and str(preset["max_bounces"]) in preset["gives_up"]
-    readme = (Path(__file__).parents[3] / "README.md").read_text()
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
     assert all(quality.text(name, prices) in readme for name in quality.PRESETS), "run `make tradeoff`"
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
 from service.document import presets
+from tests.bench.seeds.stage import Document, Stage, rmse, sheet, shown
 
 DEGREES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
 SIZE, SAMPLES, MANY = 96, 16, 1024

@@ -14,11 +14,11 @@ import numpy as np
 
 from gpu import Band, Renderer, RenderSettings, border_after
 from gpu.analysis.metering import noise_meter_off
-from service.bench.scale_model import Costs
 from service.bench.scenes import BenchAssets
 from service.document import parse_scene, presets
 from service.pack import pack
 from service.worker.division.ledger import MOST_BYTES
+from tests.bench.scale_model import Costs
 
 if TYPE_CHECKING:
     from gpu import Picture

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from service.bench.scenes import BenchAssets
-from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
 from service.document import parse_scene, presets
 from service.formats import ImageData, MeasuredData, MeshData
 from service.pack import CUBE_FACES, pack
+from tests.bench.seeds.stage import Document, Stage, rmse, sheet, shown
 
 SIZE, ERROR_SIZE = 800, 128
 COUNTS = tuple(4**k for k in range(7))  # 1, 4, ... 4 096
