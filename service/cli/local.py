@@ -1,4 +1,6 @@
-"""Renders in a Python program's own process, with the bits of `sunbox render`: what `sunbox.render` calls.
+"""Renders in a Python program's own process, with the bits of `sunbox render`.
+
+`sunbox.render` finds this module by the entry point `sunbox.renderers`, and calls what `__all__` names.
 
 All calls come from one thread, which has the OpenGL context.
 """
@@ -31,6 +33,7 @@ from service.problems import FieldError, Internal, InvalidDocument, ServiceError
 from service.views import AOVS, FileFormat
 from service.worker.in_process import InProcessRenderer
 
+__all__ = ["Interrupt", "LocalRenderer", "ServiceError", "as_problem", "stop"]
 _VIEW: TypeAdapter[PictureView] = TypeAdapter(PictureView)
 
 

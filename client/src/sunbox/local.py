@@ -7,34 +7,31 @@ import asyncio
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from importlib.metadata import entry_points
+from typing import Any
 
 from sunbox import files
 from sunbox.async_job import AsyncPicture
 from sunbox.client import Picture, run
 from sunbox.errors import SunboxError, from_problem
 
-if TYPE_CHECKING:
-    from service.cli.local import LocalRenderer
+GROUP, NAME = "sunbox.renderers", "local"  # the entry point of a package that renders in this process
 
 
 def render(scene: Any, **settings: Any) -> Picture:
     """The picture of a scene: a dict, or a path to its JSON file. Files are named by path. Ctrl-C ends it. Raises
     SunboxError as `Client.render` does, and RuntimeError where the package `sunbox-server` is not installed."""
-    _service()
+    _engine()
     return Picture(run(_rendered(scene, settings)))
 
 
 async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
-    from service.cli.local import stop
-    from service.cli.tracing import Interrupt
-
     document, folder = files.read_scene(scene)
-    interrupt = Interrupt()
+    interrupt = _engine().Interrupt()
     try:
         made = await _on_gl_thread(lambda: _renderer().render(document, settings, folder, interrupt))
     except asyncio.CancelledError:
-        stop(interrupt)
+        _engine().stop(interrupt)
         raise
 
     async def fetch(format: str, view: dict[str, Any]) -> bytes:
@@ -47,13 +44,11 @@ async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
 
 
 async def _on_gl_thread(call: Any) -> Any:
-    from service.cli.local import as_problem
-    from service.problems import ServiceError
-
+    engine = _engine()
     try:
         return await asyncio.get_running_loop().run_in_executor(_thread(), call)
-    except ServiceError as error:
-        status, document = as_problem(error)
+    except engine.ServiceError as error:
+        status, document = engine.as_problem(error)
         problem: SunboxError = from_problem(document, status)
     raise problem
 
@@ -65,16 +60,20 @@ def _thread() -> ThreadPoolExecutor:
 
 
 @cache
-def _renderer() -> LocalRenderer:
-    from service.cli.local import LocalRenderer
-
-    return LocalRenderer()
+def _renderer() -> Any:
+    return _engine().LocalRenderer()
 
 
-def _service() -> None:
-    try:
-        import service.cli.local  # noqa: F401
-    except ImportError as error:
-        raise RuntimeError(
-            "sunbox.render needs the package sunbox-server (pip install 'sunbox[local]'); sunbox.Client does not."
-        ) from error
+@cache
+def _engine() -> Any:
+    """What the server's package offers: LocalRenderer, Interrupt, stop, ServiceError and as_problem. This package
+    knows that one by its entry point alone."""
+    cause = None
+    for entry in entry_points(group=GROUP, name=NAME):
+        try:
+            return entry.load()
+        except ImportError as error:
+            cause = error
+    raise RuntimeError(
+        "sunbox.render needs the package sunbox-server (pip install 'sunbox[local]'); sunbox.Client does not."
+    ) from cause
