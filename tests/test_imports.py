@@ -22,6 +22,7 @@ COMPOSERS = {"lights", "light_tree", "shapes", "traverse", "transparency", "tran
 KINDS = ("bsdf/lobes/**", "bsdf/models", "lights", "shapes", "tonemap")
 LEAVES = sorted(p for kind in KINDS for p in ROOT.glob(f"shaders/{kind}/*.glsl") if p.stem not in COMPOSERS)
 CLIENT = sorted(path for path in ROOT.glob("client/**/*.py") if path.name != "document.py")  # that is generated
+PACKAGE = [path for path in CLIENT if path.is_relative_to(ROOT / "client" / "src") and path.stem != "__init__"]
 SOURCES = sorted((*MODULES, *CLIENT, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
 MOST_LINES = 400
 MOST_METHODS, MOST_ATTRIBUTES = 30, 18  # of a class, its bases included
@@ -246,6 +247,15 @@ def test_the_renderers_process_shares_only_its_channel() -> None:
 
 def test_there_are_no_circles() -> None:
     assert circles(graph()) == []
+
+
+def test_there_are_no_circles_in_the_client() -> None:
+    """Nor between it and the service, of which it imports nothing."""
+    paths = {".".join(path.relative_to(ROOT / "client" / "src").with_suffix("").parts): path for path in PACKAGE}
+    arrows = {
+        name: {existing(each, {*paths}) for each in imports_of(path)} - {"", name} for name, path in paths.items()
+    }
+    assert arrows["sunbox.client"] and circles(arrows) == []
 
 
 def test_there_are_no_circles_between_folders() -> None:
