@@ -116,7 +116,7 @@ def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
-# varying index. 0: they are too many for that to gain time, or in the tree. docs/house.md says what each gains.
+# varying index. 0: they are too many for that to gain time, or in the tree. docs/development.md says what each gains.
 COUNTS = {f"{kind.name}_COUNT": kind for kind in SHAPES}
 FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
 _FEW_MAX = 64

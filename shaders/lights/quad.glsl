@@ -88,8 +88,8 @@ LightSample quad_light_sample(Quad q, vec3 p, vec2 u, uint sides) {
     return LightSample(wi, t, vec3(1.0), w.s > 0.0 ? 1.0 / w.s : quad_light_area_pdf(q, t, wi), true, NONE);
 }
 
-// The quad of a light. Where only one quad emits, as in many a room, it is loaded from a constant place: docs/house.md
-// says how much time this saves.
+// The quad of a light. Where only one quad emits, as in many a room, it is loaded from a constant place:
+// docs/development.md says how much time this saves.
 Quad quad_light_load(uint i) {
 #if QUAD_LAMP >= 0
     return quad_load(uint(QUAD_LAMP));
