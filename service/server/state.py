@@ -30,8 +30,8 @@ from service.server.http.downloads import Downloads
 from service.server.operation.loading import Loading
 from service.server.operation.readiness import SOFTWARE, Readiness
 from service.server.operation.traffic import Traffic
-from service.server.renders.job import Job
 from service.server.renders.queue import RenderQueue
+from service.server.renders.render import Render
 from service.server.renders.store.record import Order, Outcome, StoredRender
 from service.server.requests.bodies import Bodies
 from service.server.requests.request_parser import unfolded
@@ -128,33 +128,33 @@ class AppState:
         self.batches.go_on()
         await self.callbacks.start()
 
-    def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
+    def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Render:
         """A new render. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
         return self._job(order, document, packed, outcome)
 
-    def _job(self, order: Order, document: bytes | None, packed: Packed | None, outcome: Outcome) -> Job:
+    def _job(self, order: Order, document: bytes | None, packed: Packed | None, outcome: Outcome) -> Render:
         load = partial(self._pack, order.owner)
-        return Job(self.renderers, order, load, document, packed, outcome, self.memory, self.render_queue.packed)
+        return Render(self.renderers, order, load, document, packed, outcome, self.memory, self.render_queue.packed)
 
     def _members(self, batch: Batch, body: bytes) -> Members:
         return Members(batch, body, self.reader, self._member)
 
-    def _member(self, order: Order, document: bytes | None, packed: Packed | None) -> Job:
+    def _member(self, order: Order, document: bytes | None, packed: Packed | None) -> Render:
         """A new render of a batch. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(warnings=list(packed.warnings) if packed is not None else [])
         return self._job(order, document, packed, outcome)
 
-    def _told_of(self, kind: CallbackKind, id: str, owner: str) -> Job | Batch:
+    def _told_of(self, kind: CallbackKind, id: str, owner: str) -> Render | Batch:
         """Whose end a callback is about. Raises NotFound, Gone."""
         return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
-    def _resumed(self, stored: StoredRender) -> Job:
+    def _resumed(self, stored: StoredRender) -> Render:
         return self._ended(stored.order, stored.outcome)
 
-    def _ended(self, order: Order, outcome: Outcome) -> Job:
+    def _ended(self, order: Order, outcome: Outcome) -> Render:
         """A render that an earlier server had, or that cannot begin."""
-        return Job(self.renderers, order, partial(self._pack, order.owner), outcome=outcome, budget=self.memory)
+        return Render(self.renderers, order, partial(self._pack, order.owner), outcome=outcome, budget=self.memory)
 
     async def _pack(self, owner: str, document: bytes, count: Callable[[int], None]) -> Packed:
         """The packed scene of an owner's folded document, which was valid when it was stored. Raises what reading it

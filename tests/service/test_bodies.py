@@ -15,7 +15,7 @@ from service.config import Config
 from service.document.text import most_bytes
 from service.problems import Unavailable
 from service.server.app import create_app
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.requests.bodies import SMALL
 from service.server.routes.submission import allowed
 from service.server.state import AppState
@@ -177,7 +177,7 @@ def test_a_body_s_values_count_until_they_are_packed(
         async def waits(*args: Any, **values: Any) -> Any:
             seen.append(state.memory.used()["bodies"])
             for job in args:
-                if isinstance(job, Job):
+                if isinstance(job, Render):
                     assert state.memory.used()["scenes"] > 0, "what was packed counts, too"
                     job.release()  # as the queue does with one that it refuses
             raise Unavailable("It has been waiting.")

@@ -27,7 +27,7 @@ from service.server.app import create_app
 from service.server.batches.batch import Batch, member_id
 from service.server.http.keys import Keys
 from service.server.operation.readiness import Readiness
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.viewer import PictureViewer
@@ -181,9 +181,9 @@ async def filled(state: AppState, folder: Path) -> dict[str, str]:
     )
     settings = resolve(Settings(width=8, height=8))
 
-    def job(id: str) -> Job:
+    def job(id: str) -> Render:
         document = small if id.startswith(("b", "c")) else large
-        made = Job(state.renderers, Order(id, owner, settings, LONG, 0, 1.0), load, document, outcome=outcome)
+        made = Render(state.renderers, Order(id, owner, settings, LONG, 0, 1.0), load, document, outcome=outcome)
         queue._jobs[id] = made
         queue._number = made.number = queue._number + 1
         return made

@@ -6,7 +6,7 @@ import asyncio
 from contextlib import suppress
 from typing import Any, cast
 
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.routes import events
 from tests.counting import in_simulated_time
 
@@ -36,7 +36,7 @@ def sent(busy_s: float, ends_s: float) -> list[str]:
 
     async def test() -> None:
         with suppress(StopAsyncIteration):
-            pieces = events._events(cast(Job, Changing(busy_s, ends_s)))
+            pieces = events._events(cast(Render, Changing(busy_s, ends_s)))
             while True:
                 found.append((await anext(pieces)).decode().partition("\n")[0])
 

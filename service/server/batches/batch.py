@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 from service.document.quality import resolve
 from service.document.settings import Settings
 from service.server.batches.steps import Steps
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.status import iso, status
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import ENDED, End, Order, Outcome, State
@@ -50,15 +50,15 @@ class Batch:
         self.steps = Steps.of(order.renders)
         # By step: renders that wait, run, or have ended and are not whole on the disk; and those that are rows of the
         # store, as long as somebody looks at them.
-        self.jobs: dict[int, Job] = {}
-        self.shown: WeakValueDictionary[int, Job] = WeakValueDictionary()
+        self.jobs: dict[int, Render] = {}
+        self.shown: WeakValueDictionary[int, Render] = WeakValueDictionary()
         self.finished = asyncio.Event()
         self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; whoever waits clears it
         self.ended_at = 0.0  # by the monotonic clock
         self.making = asyncio.Lock()  # while one of its files is made
         self._stored_bytes = 0  # of the renders that are rows
 
-    def add(self, step: int, job: Job) -> None:
+    def add(self, step: int, job: Render) -> None:
         """A render is there; it may have ended before it began."""
         self.jobs[step] = job
         job.batch = self
@@ -72,7 +72,7 @@ class Batch:
         self.steps.end(step, state, ended_at)
         self._stored_bytes += size
 
-    def ended(self, job: Job) -> None:
+    def ended(self, job: Render) -> None:
         """One of its renders has ended."""
         step, state = step_of(job.id), job.state
         if not self.steps.is_under_way(step) or state == "queued" or state == "running":
@@ -83,14 +83,14 @@ class Batch:
             self.steps.measured += 1
         self.look()
 
-    def settle(self, job: Job) -> None:
+    def settle(self, job: Render) -> None:
         """An ended render is whole on the disk, and from now on a row there."""
         step = step_of(job.id)
         if self.jobs.pop(step, None) is not None:
             self._stored_bytes += job.size
             self.shown[step] = job
 
-    def job(self, step: int) -> Job | None:
+    def job(self, step: int) -> Render | None:
         """A render that is in memory."""
         return self.jobs.get(step) or self.shown.get(step)
 
@@ -134,7 +134,7 @@ class Batch:
     def state_of(self, step: int) -> State:
         return self._state_of(step, self.steps, self.jobs)
 
-    def _state_of(self, step: int, steps: Steps, jobs: Mapping[int, Job]) -> State:
+    def _state_of(self, step: int, steps: Steps, jobs: Mapping[int, Render]) -> State:
         if not steps.is_made(step):
             return "cancelled" if self.cancelled else "queued"
         return jobs[step].state if steps.is_under_way(step) else steps.how(step)
@@ -149,7 +149,7 @@ class Batch:
         each_s = self.steps.busy_s / measured if measured else None
         return partial(self._status, self.state, self.steps.copy(), dict(self.jobs), each_s)
 
-    def _status(self, state: State, steps: Steps, jobs: Mapping[int, Job], each_s: float | None) -> dict[str, Any]:
+    def _status(self, state: State, steps: Steps, jobs: Mapping[int, Render], each_s: float | None) -> dict[str, Any]:
         """`each_s`: the seconds that a render takes; None: it is not known, or none is to come."""
         states = [self._state_of(step, steps, jobs) for step in range(self.order.renders)]
         counts = Counter(states)

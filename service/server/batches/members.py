@@ -14,7 +14,7 @@ from service.document.text import most_bytes
 from service.pack import PackCache, Packed
 from service.problems import InvalidDocument, ServiceError, TooLarge
 from service.server.batches.batch import Batch, member_id
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.store.record import Order
 from service.server.requests.batch_request import variations
 from service.server.requests.request_parser import LONGEST_LABEL, folded, unfolded
@@ -22,7 +22,7 @@ from service.server.requests.request_reader import RequestReader
 from service.system.executors import packing
 
 # A new render of an order: its document where no store has it, its packed scene where there is one.
-NewJob = Callable[[Order, bytes | None, Packed | None], Job]
+NewJob = Callable[[Order, bytes | None, Packed | None], Render]
 
 
 class Members:
@@ -42,7 +42,7 @@ class Members:
         """Raise what packing the first render's scene raises."""
         await packing(self._check, self._batch.client)
 
-    async def job(self, step: int, stored: bool) -> Job:
+    async def job(self, step: int, stored: bool) -> Render:
         """A render that is ready to be queued. One whose scene cannot be packed says why when its turn comes."""
         document, settings, packed = await packing(partial(self._packed, step), self._batch.client)
         order, label = self._batch.order, self._variations.name(step)[:LONGEST_LABEL]

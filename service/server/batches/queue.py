@@ -10,9 +10,9 @@ from functools import partial
 from service.problems import MISTAKE, Conflict, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.server.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, member_id, step_of
 from service.server.batches.members import Members
-from service.server.renders.job import Job
 from service.server.renders.queue import RETRY_S, RenderQueue
-from service.server.renders.settled import looked_at
+from service.server.renders.render import Render
+from service.server.renders.retention import looked_at
 from service.server.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.server.renders.store.record import IdempotencyKey, Order, Outcome
 from service.server.storage.asset_access import AllowedUses
@@ -34,7 +34,7 @@ class BatchQueue:
         self,
         renders: RenderQueue,
         members: Callable[[Batch, bytes], Members],
-        ended: Callable[[Order, Outcome], Job],
+        ended: Callable[[Order, Outcome], Render],
         ahead: int,
     ) -> None:
         """`ended` makes a render that has ended before it began. `ahead`: renders of a batch that wait or run at a
@@ -107,7 +107,7 @@ class BatchQueue:
         found = self._place(id, owner)
         return None if found is None or found[0].steps.is_made(found[1]) else found
 
-    async def render(self, id: str, owner: str = "") -> Job:
+    async def render(self, id: str, owner: str = "") -> Render:
         """A render, of a batch or alone. Raises NotFound, Gone, and Conflict for one of a batch that is not there
         yet."""
         if (found := self._place(id, owner)) is None:
@@ -117,7 +117,7 @@ class BatchQueue:
             raise Conflict("This render of a batch waits for its turn: it has no picture yet.")
         return await self.render_of(batch, step)
 
-    async def render_of(self, batch: Batch, step: int) -> Job:
+    async def render_of(self, batch: Batch, step: int) -> Render:
         """A render that was made. Raises Gone."""
         renders, id = self._renders, member_id(batch.id, step)
         return await looked_at(batch, step, id, renders.store, renders.resting, self._made_ended)
@@ -213,11 +213,11 @@ class BatchQueue:
             log.exception("a failed render of a batch could not be stored")
             self._renders.take_member(job, batch, step)
 
-    async def _wait_for_room(self, job: Job, batch: Batch, step: int) -> None:
+    async def _wait_for_room(self, job: Render, batch: Batch, step: int) -> None:
         while not batch.cancelled and not await self._queued(job, batch, step):
             await self._changed(batch, AGAIN_S)
 
-    async def _queued(self, job: Job, batch: Batch, step: int) -> bool:
+    async def _queued(self, job: Render, batch: Batch, step: int) -> bool:
         """Whether there was room for it in line. A batch that was cancelled meanwhile takes it out again."""
         batch.queueing = True
         try:

@@ -20,8 +20,7 @@ from service.problems import FieldError, InvalidDocument, ServiceError, TooManyR
 from service.server.batches.batch import Batch
 from service.server.callbacks import signing
 from service.server.callbacks.events import event
-from service.server.renders.job import Job
-from service.server.renders.status import snapshot
+from service.server.renders.render import Render
 from service.server.storage.callback_rows import Callback, CallbackRows, Kind
 from service.server.storage.database import Database
 from service.system.background import Background, reported
@@ -53,7 +52,7 @@ log = logging.getLogger(__name__)
 class Callbacks:
     """For the event loop, but for `listed`."""
 
-    def __init__(self, config: Config, find: Callable[[Kind, str, str], Job | Batch]) -> None:
+    def __init__(self, config: Config, find: Callable[[Kind, str, str], Render | Batch]) -> None:
         """`find` gives the render or batch of an id and owner, and raises NotFound, Gone."""
         self._config = config
         self._hosts = CallbackHosts.parse(config.callback_hosts)
@@ -101,7 +100,7 @@ class Callbacks:
                 self._tasks.start(CALLBACK, self._end(each, error))
         self._tasks.start("sender of callbacks", self._run())
 
-    def follow(self, subject: Job | Batch) -> None:
+    def follow(self, subject: Render | Batch) -> None:
         """Send a callback when it has ended; it is stored already."""
         self._pending[subject.owner] += 1
         self._tasks.start(CALLBACK, self._follow(subject))
@@ -110,12 +109,12 @@ class Callbacks:
         """The server ends: what is not delivered is left for the next one."""
         await self._tasks.close()
 
-    async def _follow(self, subject: Job | Batch) -> None:
+    async def _follow(self, subject: Render | Batch) -> None:
         await subject.finished.wait()
-        if isinstance(subject, Job):
+        if isinstance(subject, Render):
             await subject.recorded()
-        kind: Kind = "render" if isinstance(subject, Job) else "batch"
-        status = snapshot(subject) if isinstance(subject, Job) else subject.snapshot()
+        kind: Kind = "render" if isinstance(subject, Render) else "batch"
+        status = subject.snapshot()
         body = await answering(lambda: event(kind, status()))
         await self._stored(partial(self._rows.make_due, kind, subject.id, body, time.time()))
         self._woken.set()

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.store.record import State
 
 
@@ -14,12 +14,12 @@ from service.server.renders.store.record import State
 class Page:
     """Renders, the newest first, and whether there are more."""
 
-    renders: list[Job]
+    renders: list[Render]
     more: bool
 
 
 def page(
-    newest_first: Iterable[Job], owner: str, label: str | None, state: State | None, limit: int, last: int | None
+    newest_first: Iterable[Render], owner: str, label: str | None, state: State | None, limit: int, last: int | None
 ) -> Page:
     """Those of an owner, of that label and state, whose number is below `last`; none of a batch. For any thread."""
     fits = (

@@ -15,13 +15,10 @@ from service.problems import FieldError, Gone, InvalidDocument, NotFound, TooMan
 from service.server.renders import listing
 from service.server.renders.documents import WaitingDocuments
 from service.server.renders.followers import Follower, Followers
-from service.server.renders.job import Job
-from service.server.renders.ordered import InBatch
 from service.server.renders.recorder import Recorder
-from service.server.renders.resting import Resting
-from service.server.renders.retention import KeptRenders, QueueLimits
+from service.server.renders.render import InBatch, Render
+from service.server.renders.retention import KeptRenders, QueueLimits, Resting, forget, in_memory, settle, take_up
 from service.server.renders.scene import PackedScenes
-from service.server.renders.settled import forget, in_memory, settle, take_up
 from service.server.renders.slots import Slots
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
@@ -46,8 +43,8 @@ class RenderQueue:
         """With a `store` renders outlive the server."""
         self.limits = limits
         self.store = store
-        self._jobs: dict[str, Job] = {}  # in the order of arrival, without those of batches that are rows
-        self._followers = Followers[Job]()
+        self._jobs: dict[str, Render] = {}  # in the order of arrival, without those of batches that are rows
+        self._followers = Followers[Render]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
         self._slots = Slots(self.limits.running, self._ran)
@@ -55,7 +52,7 @@ class RenderQueue:
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._documents = WaitingDocuments(self.limits.disk_bytes)
-        self._kept: KeptRenders[Job | InBatch] = KeptRenders(self.limits.retention)
+        self._kept: KeptRenders[Render | InBatch] = KeptRenders(self.limits.retention)
         self.resting = Resting()
         self._chores = Background()
         self._timer: asyncio.TimerHandle | None = None
@@ -64,7 +61,7 @@ class RenderQueue:
     def resume(
         self,
         stored: Collection[StoredRender],
-        make: Callable[[StoredRender], Job],
+        make: Callable[[StoredRender], Render],
         batches: Collection[InBatch] = (),
         members: Mapping[str, tuple[int, int]] | None = None,
         ended: Collection[EndedMember] = (),
@@ -101,7 +98,7 @@ class RenderQueue:
         self._slots.dispatch()
 
     async def submit(
-        self, job: Job, uses: AllowedUses = NO_USES, key: IdempotencyKey | None = None, listed: bool = True
+        self, job: Render, uses: AllowedUses = NO_USES, key: IdempotencyKey | None = None, listed: bool = True
     ) -> None:
         """Queue a job, which runs when its turn comes; it is stored first where that is possible.
 
@@ -126,9 +123,9 @@ class RenderQueue:
         self._slots.add(job)
         self._slots.dispatch()
         if job in self._waiting:
-            job.set_aside()
+            job.scene.set_aside()
 
-    async def submit_member(self, job: Job, batch: InBatch, step: int) -> None:
+    async def submit_member(self, job: Render, batch: InBatch, step: int) -> None:
         """Queue a render of a batch, as `submit`: it is not listed, and stays for as long as its batch does."""
         self.admit(job.owner)
         if self.store is not None:
@@ -142,7 +139,7 @@ class RenderQueue:
             job.recorder = Recorder(self.store, job.number, job.id, whole, job.renderers, job.owner)
         self.take_member(job, batch, step)
 
-    def take_member(self, job: Job, batch: InBatch, step: int) -> None:
+    def take_member(self, job: Render, batch: InBatch, step: int) -> None:
         """A render of a batch is there, and waits if it has not ended."""
         self._number = job.number = max(job.number, self._number + 1)
         self._know(job)
@@ -153,7 +150,7 @@ class RenderQueue:
         self._slots.add(job)
         self._slots.dispatch()
         if job in self._waiting:
-            job.set_aside()
+            job.scene.set_aside()
 
     def admit(self, owner: str) -> None:
         """Raise what `submit` would raise, before a scene is read for nothing."""
@@ -169,7 +166,7 @@ class RenderQueue:
         if self.queued >= self.limits.waiting and own >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 
-    def get(self, id: str, owner: str = "") -> Job:
+    def get(self, id: str, owner: str = "") -> Render:
         if id in self._gone and self._gone[id][0] == owner:
             raise Gone("This render was deleted, or it ended long ago and made room for newer ones.")
         job = self._jobs.get(id)
@@ -194,7 +191,7 @@ class RenderQueue:
         return await answering(partial(listing.page, newest_first, owner, label, state, limit, last))
 
     @contextmanager
-    def follower(self, owner: str) -> Iterator[Follower[Job]]:
+    def follower(self, owner: str) -> Iterator[Follower[Render]]:
         """Learns of every change of an owner's renders; first of those that are under way."""
         with self._followers.follower(owner) as follower:
             under_way = (*self._slots.running, *self._waiting.line(owner))  # not all that are kept: those are many
@@ -225,7 +222,7 @@ class RenderQueue:
     def kept(self) -> int:
         return len(self._kept)
 
-    def _know(self, job: Job) -> None:
+    def _know(self, job: Render) -> None:
         """Find it by its id from now on, and its picture where memory is taken from."""
         self._jobs[job.id] = job
         job.resting = self.resting
@@ -247,7 +244,7 @@ class RenderQueue:
                 await asyncio.gather(*(job.close() for job in self._jobs.values() if not job.finished.is_set()))
                 await self._chores.ended()
 
-    async def _stored(self, job: Job, uses: AllowedUses, key: IdempotencyKey | None) -> int:
+    async def _stored(self, job: Render, uses: AllowedUses, key: IdempotencyKey | None) -> int:
         """The number that the store gave to the job."""
         self._documents.take(job, job.order.bytes)
         self._storing[job.owner] += 1
@@ -259,7 +256,7 @@ class RenderQueue:
         finally:
             self._storing[job.owner] -= 1
 
-    async def _insert(self, job: Job, uses: AllowedUses, key: IdempotencyKey | None) -> int:
+    async def _insert(self, job: Render, uses: AllowedUses, key: IdempotencyKey | None) -> int:
         """Where nothing makes room, there is a reserve for owners of few bytes at last."""
         assert self.store is not None
         scene = job.scene
@@ -285,12 +282,12 @@ class RenderQueue:
                     raise
                 await forget(self._drop(goes), self.store)
 
-    def _ran(self, job: Job) -> None:
+    def _ran(self, job: Render) -> None:
         if job.finished.is_set() and job.id in self._jobs:
             self.resting.add(job)
         self._ended(job)
 
-    def _ended(self, job: Job) -> None:
+    def _ended(self, job: Render) -> None:
         self._documents.release(job)
         if job.finished.is_set() and job.id in self._jobs:
             if job.batch is None:
@@ -300,7 +297,7 @@ class RenderQueue:
                 self._chores.start("end of a render", settle(job, job.batch, self._jobs))
         self._evict()
 
-    def cancel(self, job: Job) -> None:
+    def cancel(self, job: Render) -> None:
         """Cancel a job that waits or runs; the image so far stays."""
         self._slots.remove(job)
         job.cancel()
@@ -308,7 +305,7 @@ class RenderQueue:
         if job.recorder is not None:
             self._chores.start("count of a picture's bytes", self._weigh(job))
 
-    async def _weigh(self, job: Job) -> None:
+    async def _weigh(self, job: Render) -> None:
         """Count what is stored of a cancelled render, once it is."""
         await job.recorded()
         if job.id in self._jobs and job.batch is None:
@@ -340,7 +337,7 @@ class RenderQueue:
         self._kept.remove(batch)
         await forget(self._drop([batch]), self.store)
 
-    async def delete(self, job: Job) -> None:
+    async def delete(self, job: Render) -> None:
         """Forget an ended render, its document and its picture. Raises Unavailable where the disk fails."""
         await job.recorded()
         if job.recorder is not None and self.store is not None:
@@ -364,7 +361,7 @@ class RenderQueue:
         if (left_s := self._kept.left_s(now)) is not None:
             self._timer = asyncio.get_running_loop().call_later(min(EVICTION_S, left_s + 1.0), self._evict)
 
-    def _drop(self, goes: Collection[Job | InBatch]) -> list[Recorder | InBatch]:
+    def _drop(self, goes: Collection[Render | InBatch]) -> list[Recorder | InBatch]:
         """Forget renders and batches; what the store has to forget of them."""
         stored = list[Recorder | InBatch]()
         for each in goes:

@@ -1,10 +1,32 @@
-"""Which ended renders make room: those of an owner of too many, those of who keeps most bytes, and old ones."""
+"""Which ended renders make room: those of an owner of too many, those of who keeps most bytes, and old ones; which of
+them stay with the renderer, so that looking at them takes no time; and those of batches, which are rows of the store
+and objects while somebody looks at them, or the renderer has their pictures."""
 
 from __future__ import annotations
 
-from collections import Counter
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
+
+from service.problems import Gone, ServiceError
+from service.server.renders.recorder import Recorder
+from service.server.renders.render import InBatch, Render
+from service.server.renders.states import PictureAt, monotonic
+from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.rows import EndedMember
+from service.server.renders.store.store import RenderStore
+
+# Bytes of them; the last one stays however large it is. The others come back from the disk.
+RESTING_BYTES = 256 << 20
+RESTING = 256  # renders: each takes 20 KB in this process, too
+SHRINK_S = 0.5  # how long a thread waits for the event loop to free memory
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -27,7 +49,7 @@ class QueueLimits:
     disk_bytes: int | None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
 
 
-class Ended(Protocol):
+class Kept(Protocol):
     @property
     def owner(self) -> str: ...
 
@@ -43,7 +65,7 @@ class Ended(Protocol):
         """Of the renders of its owner that are kept, how many it is."""
 
 
-T = TypeVar("T", bound=Ended)
+T = TypeVar("T", bound=Kept)
 
 
 class KeptRenders(Generic[T]):
@@ -116,3 +138,126 @@ class KeptRenders(Generic[T]):
     def _take(self, render: T) -> T:
         self.remove(render)
         return render
+
+
+class Resting:
+    """For the event loop, but for `shrink`."""
+
+    def __init__(self) -> None:
+        self._renders: OrderedDict[str, Render] = OrderedDict()  # the last one looked at last
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    @property
+    def bytes(self) -> int:
+        """About the memory that they take."""
+        return sum(each.resident_bytes for each in self._renders.values() if _rests(each))
+
+    def add(self, job: Render) -> None:
+        """Keep a render that has ended, or waits, with the renderer if it is there, and let others go that have not
+        been looked at for longer."""
+        self._loop = asyncio.get_running_loop()
+        self._renders.pop(job.id, None)
+        self._renders[job.id] = job
+        for each in list(self._renders.values()):
+            if not _rests(each):
+                del self._renders[each.id]
+        total = self.bytes
+        for each in list(self._renders.values())[:-1]:
+            if total <= RESTING_BYTES and len(self._renders) <= RESTING:
+                break
+            size = each.resident_bytes
+            if each.rest():
+                total -= size
+                del self._renders[each.id]
+
+    def remove(self, job: Render) -> None:
+        self._renders.pop(job.id, None)
+
+    def shrink(self, size: int) -> None:
+        """Have ended renders leave the renderer until they have freed that many bytes. For any thread."""
+        loop = self._loop
+        try:
+            elsewhere = loop is not asyncio.get_running_loop()
+        except RuntimeError:
+            elsewhere = True
+        if loop is None or not elsewhere:
+            self._shrink(size)
+            return
+        with contextlib.suppress(concurrent.futures.TimeoutError, RuntimeError):  # busy, or closed
+            asyncio.run_coroutine_threadsafe(self._shrunk(size), loop).result(SHRINK_S)
+
+    async def _shrunk(self, size: int) -> None:
+        self._shrink(size)
+
+    def _shrink(self, size: int) -> None:
+        for job in list(self._renders.values()):
+            if size <= 0:
+                break
+            freed = job.resident_bytes
+            if job.rest():
+                size -= freed
+                del self._renders[job.id]
+
+
+def _rests(job: Render) -> bool:
+    """Whether a renderer has its picture and adds nothing to it: it ended, or it gave way and was looked at."""
+    return job.resident_bytes > 0 and (job.finished.is_set() or job.picture_at is PictureAt.BOTH)
+
+
+Make = Callable[[Order, Outcome], Render]  # a render that has ended
+
+
+def take_up(batches: Iterable[InBatch], ended: Iterable[EndedMember], store: RenderStore) -> None:
+    """Tell batches of an earlier server which of their renders have ended."""
+    known = {batch.number: batch for batch in batches}
+    for each in ended:
+        if (batch := known.get(each.batch)) is not None:
+            batch.add_ended(each.step, each.state, monotonic(each.ended_at), store.picture_size(each.id))
+
+
+async def settle(job: Render, batch: InBatch, jobs: dict[str, Render]) -> None:
+    """A render has ended: it leaves `jobs` once it is whole on the disk."""
+    await job.recorded()
+    if job.recorder is not None and job.recorder.whole:
+        jobs.pop(job.id, None)
+        batch.settle(job)
+
+
+async def looked_at(
+    batch: InBatch, step: int, id: str, store: RenderStore | None, resting: Resting, make: Make
+) -> Render:
+    """A render of a batch, brought back from the store where it is not in memory; its picture stays with `resting`.
+    Raises Gone."""
+    job: Render | None = batch.job(step)
+    if job is None and store is not None:
+        stored = await store.one(id)
+        job = batch.job(step)  # others may have been faster
+        if job is None and stored is not None:
+            job = batch.shown[step] = make(stored.order, stored.outcome)
+            job.number, job.batch, job.resting = stored.number, batch, resting
+            job.recorder = Recorder(store, stored.number, id, True, job.renderers, job.owner)
+    if job is None or batch.gone:
+        raise Gone("This render was deleted with its batch, or made room for newer ones.")
+    return job
+
+
+def in_memory(batch: InBatch) -> list[Render]:
+    """The renders of a batch that are objects."""
+    return [*batch.jobs.values(), *batch.shown.values()]
+
+
+async def forget(dropped: Collection[Recorder | InBatch], store: RenderStore | None) -> None:
+    """Delete renders and batches from the store."""
+    if store is None:
+        return
+    batches = [each for each in dropped if not isinstance(each, Recorder)]
+    recorders = [each for each in dropped if isinstance(each, Recorder)]
+    members = [job.recorder for batch in batches for job in in_memory(batch) if job.recorder is not None]
+    for recorder in recorders + members:
+        await recorder.close()
+    try:
+        await store.forget([(recorder.number, recorder.id) for recorder in recorders])
+        for batch in batches:
+            await store.forget_batch(batch.number, list(batch.ids))
+    except ServiceError as error:
+        log.warning("could not delete renders from the disk", {"error": error})

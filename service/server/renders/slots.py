@@ -1,17 +1,21 @@
-"""The slots of SUNBOX_MAX_RUNNING: which renders run, which wait, and which give way to others."""
+"""The slots of SUNBOX_MAX_RUNNING: which renders run, which wait, and which give way to others.
+
+Those of a client with more slots than its share give way, or the longest ones.
+A render that gives way is stored and goes on later, so that it costs a checkpoint and loading its scene again.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import chain, islice
+from typing import Protocol, TypeVar
 
-from service.server.renders.job import Job
-from service.server.renders.preemption import LITTLE_S, SOON_S, WAIT_S, giving_way
-from service.server.renders.recent import Recent
+from service.server.renders.render import Render
 from service.server.renders.turns import Turns
 from service.system.background import Background, reported
 
@@ -21,6 +25,13 @@ PATIENCE_S = 30.0  # for which others pass a render that waits for memory; then,
 AT_ONCE = 64  # renders that are looked at in one go, which takes a millisecond
 FEW = 8  # of one owner
 SMALL = 4  # so many small renders in every slot would take all memory
+WAIT_S = 10.0  # that a render waits before others give way to it
+SOON_S = 1.0  # instead, where its client has nothing and had less than LITTLE_S within the last minute
+# A client that comes again and again with a little interrupts others for that part of the time at most: each
+# interruption costs them a checkpoint and a scene to load.
+LITTLE_S = 1.0
+TIMES = 2  # a render gives way once it has run this many times as long as the waiting one
+RECENT_S = 60.0  # for which a turn at a slot counts after its end
 
 log = logging.getLogger(__name__)
 
@@ -28,35 +39,37 @@ log = logging.getLogger(__name__)
 class Slots:
     """For the event loop. A render has a slot and its memory, or neither of them."""
 
-    def __init__(self, most: int, ended: Callable[[Job], None], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, most: int, ended: Callable[[Render], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """`ended` is called with each render whose slot is free for good."""
-        self.waiting: Turns[Job] = Turns()
+        self.waiting: Turns[Render] = Turns()
         self.closing = False
         self._most = most
         self._ended = ended
         self._clock = clock
-        self._running: dict[asyncio.Task[None], Job] = {}
+        self._running: dict[asyncio.Task[None], Render] = {}
         self._recent = Recent(clock)
-        self._since: dict[Job, float] = {}  # when each that waits came into line
-        self._lacking: dict[Job, float] = {}  # those that something is missing for, since when, the longest first
-        self._tried: dict[Job, None] = {}  # of these, those that are not to be tried just now, the next ones first
+        self._since: dict[Render, float] = {}  # when each that waits came into line
+        self._lacking: dict[Render, float] = {}  # those that something is missing for, since when, the longest first
+        self._tried: dict[Render, None] = {}  # of these, those that are not to be tried just now, the next ones first
         self._tried_at = 0.0
-        self._claim: Job | None = None  # the one that others are giving way to
-        self._leaving: set[Job] = set()  # these others
+        self._claim: Render | None = None  # the one that others are giving way to
+        self._leaving: set[Render] = set()  # these others
         self._timer: asyncio.TimerHandle | None = None
         self._tasks = Background()
 
     @property
-    def running(self) -> list[Job]:
+    def running(self) -> list[Render]:
         """In the order in which they began."""
         return list(self._running.values())
 
-    def add(self, job: Job) -> None:
+    def add(self, job: Render) -> None:
         """Have it wait; `dispatch` starts it when its turn comes."""
         self.waiting.add(job)
         self._since[job] = self._clock()
 
-    def remove(self, job: Job) -> bool:
+    def remove(self, job: Render) -> bool:
         """Whether it was waiting."""
         self._lacking.pop(job, None)
         self._tried.pop(job, None)
@@ -111,11 +124,11 @@ class Slots:
             del self._tried[job]
         self._tried_at = self._clock()
 
-    def _start(self, job: Job) -> None:
+    def _start(self, job: Render) -> None:
         self._lacking.pop(job, None)
         self._since.pop(job, None)
         self._recent.begins(job)
-        task = self._tasks.start("render", job.run(), job.rendering.died)
+        task = self._tasks.start("render", job.run(), job.died)
         self._running[task] = job
         task.add_done_callback(self._ran)
 
@@ -132,11 +145,11 @@ class Slots:
             self._lack(job)
         self.dispatch()
 
-    def _lack(self, job: Job) -> None:
+    def _lack(self, job: Render) -> None:
         self._lacking.setdefault(job, self._clock())
         self._tried[job] = None
 
-    def _fits(self, job: Job) -> bool:
+    def _fits(self, job: Render) -> bool:
         """Whether it may begin now; its memory is counted then."""
         if job in self._tried or self._held_back(job) or not self._in_share(job):
             return False
@@ -145,7 +158,7 @@ class Slots:
         self._lack(job)
         return False
 
-    def _held_back(self, job: Job) -> bool:
+    def _held_back(self, job: Render) -> bool:
         """Whether it would take memory that another one has waited for: so no stream of renders starves a large one.
 
         Only for half of the time, as what that one waits for may be endless."""
@@ -153,7 +166,7 @@ class Slots:
         waited = self._clock() - self._lacking.get(first, self._clock())
         return first is not job and int(waited / PATIENCE_S) % 2 == 1 and job.memory_share > 1 / (SMALL * self._most)
 
-    def _in_share(self, job: Job) -> bool:
+    def _in_share(self, job: Render) -> bool:
         """Whether it may have a slot that it cannot give back: of these an owner leaves half to the others."""
         if job.lasting or not job.owner:
             return True
@@ -176,7 +189,7 @@ class Slots:
                 self._tasks.start("hand-over of slots", self._give_way(waiting, chosen), self._gave_up)
                 return
 
-    def _waited_enough(self, waiting: Job, waited_s: float) -> bool:
+    def _waited_enough(self, waiting: Render, waited_s: float) -> bool:
         """Whether others may give way to it. They do so soon where its client has nothing, and has had little lately
         or lacks a slot alone, of which another client has several."""
         if not SOON_S <= waited_s < WAIT_S:
@@ -187,13 +200,13 @@ class Slots:
         has_several = max(counts.values(), default=0) > 1
         return self._recent.seconds(waiting.client) < LITTLE_S or (has_several and not waiting.lacks)
 
-    def _firsts(self, owner: str) -> list[Job]:
+    def _firsts(self, owner: str) -> list[Render]:
         """Those of an owner for which others may give way: the first that gave way itself, and some that begin."""
         line = self.waiting.line(owner)
         began = [job for job in line[:1] if job.began]
         return began + list(islice((job for job in line if not job.began), FEW))
 
-    async def _give_way(self, waiting: Job, chosen: list[Job]) -> None:
+    async def _give_way(self, waiting: Render, chosen: list[Render]) -> None:
         tasks = {job: task for task, job in self._running.items() if job in self._leaving}
         gave = await asyncio.gather(*(job.give_way() for job in chosen))
         for job, gives in zip(chosen, gave, strict=True):
@@ -208,7 +221,7 @@ class Slots:
         if self._claim is not None:
             self._handed_over(self._claim)
 
-    def _handed_over(self, waiting: Job) -> None:
+    def _handed_over(self, waiting: Render) -> None:
         left = self._leaving - set(self._running.values())
         self._claim, self._leaving = None, set()
         self._tried.pop(waiting, None)
@@ -219,3 +232,119 @@ class Slots:
             if not job.finished.is_set():
                 self.add(job)
         self.dispatch()
+
+
+class Interruptible(Protocol):
+    @property
+    def client(self) -> str:
+        """Who has the slot: its owner, or where there are no owners the render alone."""
+
+    @property
+    def owner(self) -> str: ...
+
+    @property
+    def priority(self) -> int: ...
+
+    @property
+    def place(self) -> int:
+        """It rises in the order of arrival."""
+
+    @property
+    def elapsed_s(self) -> float:
+        """For how long it has been rendered."""
+
+    @property
+    def resident_bytes(self) -> int:
+        """The memory that it gives back."""
+
+    @property
+    def can_give_way(self) -> bool: ...
+
+
+T = TypeVar("T", bound=Interruptible)
+
+
+def giving_way(waiting: T, running: Sequence[T], free: int, lacks: int) -> list[T]:
+    """Those of `running` that give way to a render that has waited for long; none where that would not be fair.
+
+    `free`: slots; `lacks`: bytes of memory that are missing. A client that has at least two slots more than the
+    waiting one gives back the render that it would have begun last. Where there are more clients than slots, slots
+    go round by time [least attained service, Nuyens and Wierman 2008]: the render that has had most time gives way to
+    one that has had at most half of that, so that it is interrupted a few times however long it is.
+    """
+    counts = Counter(each.client for each in running)
+    left = [each for each in running if each.can_give_way]
+    chosen: list[T] = []
+    while lacks > 0 or not (free or chosen):
+        own = counts[waiting.client]
+        most = max((counts[each.client] for each in left), default=0)
+        if most > own + 1:
+            rich = [each for each in left if counts[each.client] == most]
+            gives = max(rich, key=lambda each: (-each.priority, each.place))
+        elif own == 0 and (long := [each for each in left if _had_enough(each, waiting)]):
+            gives = max(long, key=lambda each: each.elapsed_s)
+        else:
+            return []
+        left.remove(gives)
+        chosen.append(gives)
+        counts[gives.client] -= 1
+        lacks -= gives.resident_bytes
+    return chosen
+
+
+def _had_enough(render: Interruptible, waiting: Interruptible) -> bool:
+    if render.owner == waiting.owner and render.priority > waiting.priority:
+        return False
+    return render.elapsed_s >= max(WAIT_S, TIMES * waiting.elapsed_s)
+
+
+@dataclass(frozen=True)
+class _Turn:
+    ended: float
+    owner: str
+    client: str
+    ms: int  # for which it was rendered; whole ones, whose sums lose nothing
+
+
+class Recent:
+    """For the event loop."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._began: dict[Interruptible, float] = {}  # of those that run: for how long each had been rendered before
+        self._turns: deque[_Turn] = deque()  # those that ended within the last minute, the first one first
+        self._counts: Counter[str] = Counter()  # of these, by owner
+        self._ms: Counter[str] = Counter()  # of these, by client
+
+    def begins(self, render: Interruptible) -> None:
+        """A render has a slot from now on."""
+        self._began[render] = render.elapsed_s
+
+    def ends(self, render: Interruptible) -> None:
+        """A render has given its slot back."""
+        ms = max(0, round(1000 * (render.elapsed_s - self._began.pop(render))))
+        turn = _Turn(self._clock(), render.owner, render.client, ms)
+        self._turns.append(turn)
+        self._counts[turn.owner] += 1
+        self._ms[turn.client] += ms
+
+    @property
+    def owners(self) -> set[str]:
+        """Those whose turns ended within the last minute."""
+        self._expire()
+        return set(self._counts)
+
+    def seconds(self, client: str) -> float:
+        """For how long the renders of a client were rendered in turns that ended within the last minute."""
+        self._expire()
+        return self._ms[client] / 1000
+
+    def _expire(self) -> None:
+        while self._turns and self._turns[0].ended <= self._clock() - RECENT_S:
+            turn = self._turns.popleft()
+            self._counts[turn.owner] -= 1
+            if not self._counts[turn.owner]:
+                del self._counts[turn.owner]
+            self._ms[turn.client] -= turn.ms
+            if not self._ms[turn.client]:
+                del self._ms[turn.client]

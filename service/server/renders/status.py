@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import partial
 from typing import Any
 
 from service.document.quality import forecast
 from service.ipc.leases import undivided
 from service.ipc.messages import Failed
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
-from service.server.renders.ordered import Ordered
 from service.server.renders.store.record import Order, Outcome
-
-
-def snapshot(render: Ordered, kernel: bool = False) -> Callable[[], dict[str, Any]]:
-    """What makes the status of a render as it is now, for any thread."""
-    return partial(status, render.order, render.outcome, render.renderers.tracing(render.task), kernel)
 
 
 def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False) -> dict[str, Any]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from service.ipc.messages import Failed, FromRenderer, Image, Progress, View
+from service.ipc.messages import Failed, FromRenderer, Image, Progress, Read, View
 from service.problems import Conflict, Internal, ServiceError, Unavailable
-from service.renderers.protocol import Listener
-from service.server.renders.ordered import Ordered
-from service.server.renders.reads import Reads
+from service.renderers.protocol import Listener, Renderers
+from service.server.renders.recorder import Recorder
+from service.server.renders.scene import RenderScene
 from service.server.renders.status import error_of
 from service.system.waiting import within
 
@@ -19,11 +22,32 @@ PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ASK_AGAIN_S = 5  # for a client whose picture was lost with a renderer
 
 
+class KeepsPictures(Protocol):
+    """Where pictures that a renderer has are registered, so that they make room when memory is needed."""
+
+    def add(self, render: Any) -> None:
+        """Somebody has looked at a render's picture, or it has ended."""
+
+
+class Shown(Protocol):
+    """A render, as far as its picture needs it."""
+
+    id: str
+    owner: str
+    renderers: Renderers
+    scene: RenderScene
+    recorder: Recorder | None
+    resting: KeepsPictures | None
+    task: int | None
+
+    async def document(self) -> bytes: ...
+
+
 class PictureViewer(Listener):
     """For the event loop. Where no renderer has the picture, it opens a task that shows what was stored and traces
     nothing; the render closes that task when it goes on."""
 
-    def __init__(self, render: Ordered) -> None:
+    def __init__(self, render: Shown) -> None:
         self.task: int | None = None  # that shows what was stored
         self.loading = asyncio.Lock()  # while this task is opened, or that of the render
         self._render, self._reads = render, Reads()
@@ -135,3 +159,40 @@ class PictureViewer(Listener):
     def _give_up(self) -> None:
         self.close()
         self._render.scene.memory.release()
+
+
+class Reads:
+    """Requests for a picture that the renderer has not answered yet."""
+
+    def __init__(self) -> None:
+        self._open: dict[int, tuple[View, asyncio.Future[Image]]] = {}
+        self._serials = itertools.count(1)
+
+    def __bool__(self) -> bool:
+        return bool(self._open)
+
+    async def ask(self, view: View, task: int, send: Callable[[Read], None]) -> Image:
+        """The answer to a Read of the task. Raises the error that is answered."""
+        serial = next(self._serials)
+        future: asyncio.Future[Image] = asyncio.get_running_loop().create_future()
+        self._open[serial] = view, future
+        send(Read(task, serial, view))
+        return await future
+
+    def ask_again(self, task: int, send: Callable[[Read], None]) -> None:
+        """Ask another task what is open."""
+        for serial, (view, _) in list(self._open.items()):
+            send(Read(task, serial, view))
+
+    def answer(self, serial: int, answer: Image | ServiceError) -> None:
+        _, future = self._open.pop(serial, (None, None))
+        if future is None or future.done():
+            return
+        if isinstance(answer, ServiceError):
+            future.set_exception(answer)
+        else:
+            future.set_result(answer)
+
+    def answer_all(self, error: ServiceError) -> None:
+        for serial in list(self._open):
+            self.answer(serial, error)

@@ -28,7 +28,7 @@ from service.ipc.messages import View
 from service.problems import Conflict, Gone, NotProvided, TooLarge
 from service.server.batches.batch import Batch
 from service.server.http.downloads import FileAnswer, Written
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.store.store import MAKING
 from service.server.requests.batch_request import variations_of
 from service.server.routes import waiting
@@ -70,7 +70,7 @@ async def _zip(request: Request, batch: Batch, query: ImageQuery, steps: Sequenc
     yield sent.taken()
 
 
-async def _render(request: Request, batch: Batch, step: int) -> Job:
+async def _render(request: Request, batch: Batch, step: int) -> Render:
     return await app_state(request).batches.render_of(batch, step)
 
 
@@ -79,13 +79,13 @@ def _whole(written: Written) -> bytes:
     return written.file.read()
 
 
-def _file_name(batch: Batch, step: int, job: Job) -> str:
+def _file_name(batch: Batch, step: int, job: Render) -> str:
     digits = max(4, len(str(batch.order.renders - 1)))
     name = re.sub(r"[^A-Za-z0-9.]+", "-", job.order.label or "").strip("-.")[:LONGEST_NAME]
     return f"{step:0{digits}}-{name}" if name else f"{step:0{digits}}"
 
 
-def _date(job: Job) -> tuple[int, int, int, int, int, int]:
+def _date(job: Render) -> tuple[int, int, int, int, int, int]:
     """When it ended, by the clock of zip files, which begins in 1980."""
     year, month, day, hour, minute, second, *_ = time.gmtime(job.outcome.ended_at or 0)
     return (year, month, day, hour, minute, second) if year >= 1980 else (1980, 1, 1, 0, 0, 0)

@@ -19,7 +19,7 @@ from service.ipc.messages import ESTIMATE
 from service.pack import Packed
 from service.problems import AssetError, FieldError, InvalidDocument, NotFound, Unavailable
 from service.server.assets.rendered import rendered
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.requests import compare_request
 from service.server.requests.compare_request import ParsedComparison, check_pixels, check_sizes
 from service.server.requests.request_parser import ParsedRequest
@@ -203,7 +203,7 @@ class _Sides:
         return Still(estimate, picture.seed, picture.ways)
 
 
-async def _estimate(job: Job) -> Estimate:
+async def _estimate(job: Render) -> Estimate:
     """Raises Conflict before the first sample, and the render's own error where it failed."""
     pixels, progress = await job.image(ESTIMATE)  # both at once: the render may go on
     return await comparing(partial(Estimate.of, pixels[..., :4], pixels[..., 4:], progress.samples))

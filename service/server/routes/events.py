@@ -15,8 +15,8 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from service.server.renders.job import Job
 from service.server.renders.queue import RenderQueue
+from service.server.renders.render import Render
 from service.server.routes.waiting import place
 from service.server.state import app_state, bodiless, caller_of
 
@@ -42,7 +42,7 @@ class _Counted(StreamingResponse):
             await super().__call__(scope, receive, send)
 
 
-def of_one(request: Request, job: Job) -> Response:
+def of_one(request: Request, job: Render) -> Response:
     """`progress` whenever the status has changed, and once `done`, with which the answer ends."""
     return _answer(request, _events(job))
 
@@ -60,7 +60,7 @@ def _answer(request: Request, events: AsyncIterator[bytes]) -> Response:
     return _Counted(request, events)
 
 
-async def _events(job: Job) -> AsyncIterator[bytes]:
+async def _events(job: Render) -> AsyncIterator[bytes]:
     said, clock = None, asyncio.get_running_loop().time
     while not job.finished.is_set():
         changed = asyncio.ensure_future(job.changed())

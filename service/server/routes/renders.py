@@ -28,8 +28,7 @@ from service.ipc import messages
 from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.server.http.downloads import Downloads, FileAnswer, Written, present
-from service.server.renders.job import Job
-from service.server.renders.status import snapshot
+from service.server.renders.render import Render
 from service.server.renders.store.record import State
 from service.server.requests.request_parser import LONGEST_LABEL, unfolded
 from service.server.routes import answers, events, json_answers, submission, waiting
@@ -146,12 +145,12 @@ async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHe
     code = 202
     with waiting.place(request) if wait else contextlib.nullcontext():
         found = await submission.submitted(request, idempotency_key)
-        if isinstance(found, Job) and wait:
-            if not await waiting.until(request, found.life.over.wait(), wait):
+        if isinstance(found, Render) and wait:
+            if not await waiting.until(request, found.over.wait(), wait):
                 return Response(status_code=GONE)
             if found.finished.is_set():
                 code = 200
-    status = found.status() if isinstance(found, Job) else found
+    status = found.status() if isinstance(found, Render) else found
     return JSONResponse(status, code, {"location": f"renders/{status['id']}"})
 
 
@@ -169,7 +168,7 @@ async def renders(request: Request, query: Annotated[ListQuery, Query()]) -> Res
     if page.more:
         following = query.model_copy(update={"after": page.renders[-1].id})
         headers["link"] = f'<renders?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
-    listed = [snapshot(job) for job in page.renders]
+    listed = [job.snapshot() for job in page.renders]
     return await json_answers.made(lambda: [status() for status in listed], headers=headers)
 
 
@@ -201,7 +200,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
         return JSONResponse(batch.waiting_status(step))
     job = await _render(request, id)
     with waiting.place(request) if wait else contextlib.nullcontext():
-        if wait and not await waiting.until(request, job.life.over.wait(), wait):
+        if wait and not await waiting.until(request, job.over.wait(), wait):
             return Response(status_code=GONE)
     return JSONResponse(job.status(kernel=kernel))
 
@@ -264,12 +263,12 @@ async def delete(request: Request, id: answers.RenderId) -> None:
         await job.recorded()
 
 
-async def _render(request: Request, id: str) -> Job:
+async def _render(request: Request, id: str) -> Render:
     """Raises NotFound, Gone, and Conflict for one of a batch that waits for its turn."""
     return await app_state(request).batches.render(id, owner_of(request))
 
 
-async def _image(request: Request, job: Job, query: ImageQuery) -> Response:
+async def _image(request: Request, job: Render, query: ImageQuery) -> Response:
     query.view()
     async with present(request.receive) as gone:
         written = await picture_file(request, job, query, gone)
@@ -279,7 +278,7 @@ async def _image(request: Request, job: Job, query: ImageQuery) -> Response:
 
 
 async def picture_file(
-    request: Request, job: Job, query: ImageQuery, gone: Callable[[], bool] = lambda: False
+    request: Request, job: Render, query: ImageQuery, gone: Callable[[], bool] = lambda: False
 ) -> Written | None:
     """The file of a render's picture; None where the client has `gone` before its turn. Raises Conflict before the
     first sample, and the render's own error where it failed."""
@@ -305,7 +304,7 @@ async def lut_of(request: Request, id: str | None) -> messages.Lut | None:
     return await storing(partial(app_state(request).reader.lut, id, owner=owner_of(request)), caller_of(request))
 
 
-async def _written(downloads: Downloads, job: Job, query: ImageQuery, lut: messages.Lut | None) -> Written:
+async def _written(downloads: Downloads, job: Render, query: ImageQuery, lut: messages.Lut | None) -> Written:
     view = replace(query.view(), lut=lut)
     layers: dict[str, np.ndarray] = {}
     samples = 0
@@ -325,21 +324,21 @@ def _aovs(query: ImageQuery) -> list[Aov]:
     return list(AOVS) if query.aov == "all" else [query.aov]
 
 
-def _most_bytes(job: Job, query: ImageQuery) -> int:
+def _most_bytes(job: Render, query: ImageQuery) -> int:
     """About the bytes of a file that cannot be compressed."""
     format = images.FORMATS[query.format]
     bits = query.bits if query.bits in format.bits else format.bits[0]
     return _texels(job, query) * bits // 8
 
 
-def _texels(job: Job, query: ImageQuery) -> int:
+def _texels(job: Render, query: ImageQuery) -> int:
     """The numbers in the layers of an image."""
     numbers = sum(len(images.LAYERS[aov]) for aov in _aovs(query)) + CRYPTOMATTE_NUMBERS * query.cryptomatte
     return job.order.settings.width * job.order.settings.height * numbers
 
 
 def _write(
-    layers: dict[str, np.ndarray], query: ImageQuery, job: Job, document: bytes, samples: int, file: BinaryIO
+    layers: dict[str, np.ndarray], query: ImageQuery, job: Render, document: bytes, samples: int, file: BinaryIO
 ) -> None:
     bits: views.Bits = 16 if query.bits == Bits.SIXTEEN else 8
     made_from = None

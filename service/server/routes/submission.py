@@ -15,7 +15,7 @@ from starlette.requests import Request
 from service.document.quality import ResolvedSettings
 from service.pack import Packed
 from service.problems import ServiceError
-from service.server.renders.job import Job
+from service.server.renders.render import Render
 from service.server.renders.status import status
 from service.server.renders.store.record import IdempotencyKey, Order, StoredRender
 from service.server.requests.parsers import Kind
@@ -29,7 +29,7 @@ from service.system.executors import opening, packing
 ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an option in a shell
 
 
-async def one_shot(request: Request) -> Job:
+async def one_shot(request: Request) -> Render:
     """A queued render that is not listed."""
     began, state = time.monotonic(), app_state(request)
     async with _parsed(request, "request") as parsed:
@@ -38,7 +38,9 @@ async def one_shot(request: Request) -> Job:
     return job
 
 
-async def unlisted(state: AppState, owner: str, document: bytes, settings: ResolvedSettings, packed: Packed) -> Job:
+async def unlisted(
+    state: AppState, owner: str, document: bytes, settings: ResolvedSettings, packed: Packed
+) -> Render:
     """A queued render of a packed scene that is not listed; whoever asks cancels and releases it."""
     order = Order(secrets.token_hex(ID_BYTES), owner, settings, None, 0, time.time(), len(document))
     job = state.job(order, document, packed, 0.0)
@@ -46,13 +48,13 @@ async def unlisted(state: AppState, owner: str, document: bytes, settings: Resol
     return job
 
 
-async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
+async def submitted(request: Request, key: str | None) -> Render | dict[str, Any]:
     """A queued render, or the earlier one with this idempotency key: its status where it is gone."""
     began, state, owner = time.monotonic(), app_state(request), owner_of(request)
     idempotency.check_key(state, key)
     async with _parsed(request, "render" if key is None else "keyed_render", key) as parsed:
 
-        async def make(taken: IdempotencyKey | None) -> Job:
+        async def make(taken: IdempotencyKey | None) -> Render:
             return await _submitted(state, parsed, owner, began, taken)
 
         found = await idempotency.once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
@@ -77,7 +79,7 @@ def _parsed(request: Request, kind: Kind, key: str | None = None) -> AbstractAsy
 
 async def _submitted(
     state: AppState, parsed: ParsedRequest, owner: str, began: float, key: IdempotencyKey | None = None
-) -> Job:
+) -> Render:
     state.render_queue.admit(owner)
     state.callbacks.check(parsed.callback, owner, state.render_queue.store is not None)
     async with allowed(state, owner, parsed.uses) as uses:
@@ -88,7 +90,7 @@ async def _submitted(
     return job
 
 
-async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: float) -> Job:
+async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: float) -> Render:
     """Packing is the last test that a scene has to pass. If it has to wait, what was packed waits with it, or where
     that is too much, it is packed again at its turn."""
     packed = await packing(partial(state.reader.pack, parsed.scene, owner=owner))
@@ -98,7 +100,7 @@ async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: flo
     return state.job(order, document, packed, time.monotonic() - began)
 
 
-def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job | dict[str, Any]:
+def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Render | dict[str, Any]:
     """The render that an equal request made earlier. Where it is gone, only its status is stored."""
     try:
         return state.render_queue.get(stored.order.id, stored.order.owner)

@@ -18,7 +18,6 @@ class Fake:
         self.elapsed_s, self.memory_share, self.began, self.fits = 0.0, 0.0, False, True
         self.lasting = self.can_give_way = True
         self.finished, self.leaves = asyncio.Event(), asyncio.Event()
-        self.rendering = self
         vars(self).update(more)
 
     def reserve(self) -> bool:

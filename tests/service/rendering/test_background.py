@@ -19,8 +19,8 @@ from service.renderers.local.supervisor import Supervisor
 from service.server.batches import queue as batch_queue
 from service.server.callbacks import queue as callback_queue
 from service.server.operation.loading import Loading
-from service.server.renders.job import Job
 from service.server.renders.recorder import Recorder
+from service.server.renders.render import Render
 from service.server.renders.slots import Slots
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore
@@ -70,9 +70,9 @@ def once(work: Callable[..., Any]) -> Callable[..., Any]:
     return either
 
 
-async def stored(renderers: Any, folder: Path) -> tuple[Job, RenderStore]:
+async def stored(renderers: Any, folder: Path) -> tuple[Render, RenderStore]:
     store, order = RenderStore(folder), Order("id", "", SETTINGS, bytes=8)
-    job = Job(renderers, order, load)
+    job = Render(renderers, order, load)
     job.recorder = Recorder(
         store, await store.insert(order, Outcome(), b"document", NO_USES), "id", renderers=renderers
     )
@@ -154,7 +154,7 @@ def test_a_render_is_begun_once_more(failures: int, state: str, dies: Any) -> No
             await super().send_scene(*given)
 
     async def test() -> None:
-        job = Job(Failing(), Order("id", "", SETTINGS), load, b"document", PACKED)  # type: ignore[arg-type]
+        job = Render(Failing(), Order("id", "", SETTINGS), load, b"document", PACKED)  # type: ignore[arg-type]
         async with asyncio.timeout(10):
             await job.run()
         assert job.state == state and (state == "done" or str(job.outcome.error) == MISTAKE)
@@ -164,12 +164,12 @@ def test_a_render_is_begun_once_more(failures: int, state: str, dies: Any) -> No
 
 
 def test_a_render_ends_whose_own_task_dies(dies: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Job, "run", broken)
+    monkeypatch.setattr(Render, "run", broken)
 
     async def test() -> None:
-        ended = list[Job]()
+        ended = list[Render]()
         slots = Slots(1, ended.append)
-        jobs = [Job(Quick(), Order(id, "", SETTINGS), load, b"document", PACKED) for id in "ab"]  # type: ignore[arg-type]
+        jobs = [Render(Quick(), Order(id, "", SETTINGS), load, b"document", PACKED) for id in "ab"]  # type: ignore[arg-type]
         for job in jobs:
             slots.add(job)
         slots.dispatch()
@@ -229,7 +229,7 @@ class Waiting:
 
     def __init__(self, name: str, owner: str) -> None:
         self.id, self.owner, self.client = name, owner, owner
-        self.finished, self.rendering = asyncio.Event(), self
+        self.finished = asyncio.Event()
         self.run, self.give_way = self.finished.wait, broken
 
     def reserve(self) -> bool:

@@ -18,8 +18,8 @@ from service.problems import MISTAKE, NotFound, TooLarge, TooManyRequests
 from service.server.batches.batch import Batch, member_id
 from service.server.batches.members import Members as RealMembers
 from service.server.batches.queue import BatchQueue
-from service.server.renders.job import Job
 from service.server.renders.queue import RenderQueue
+from service.server.renders.render import Render
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import Order, Outcome, StoredRender
 from service.server.renders.store.store import RenderStore
@@ -43,14 +43,14 @@ class Members:
 
     async def check(self) -> None: ...
 
-    async def job(self, step: int, stored: bool) -> Job:
-        return Job(self._renderers, self._batch.member(step), load, b"document", PACKED)  # type: ignore[arg-type]
+    async def job(self, step: int, stored: bool) -> Render:
+        return Render(self._renderers, self._batch.member(step), load, b"document", PACKED)  # type: ignore[arg-type]
 
 
 class Faulty(Members):
     """But for one that is too large and one that meets a mistake of the server's."""
 
-    async def job(self, step: int, stored: bool) -> Job:
+    async def job(self, step: int, stored: bool) -> Render:
         if step == 1:
             raise TooLarge("It never fits.", "/settings/width")
         if step == RENDERS - 1:
@@ -67,8 +67,8 @@ def test_a_render_that_cannot_be_made_fails_alone(tmp_path: Path, stored: bool) 
     renderers = Quick()
     store = RenderStore(tmp_path) if stored else None
 
-    def ended(order: Order, outcome: Outcome) -> Job:
-        return Job(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
+    def ended(order: Order, outcome: Outcome) -> Render:
+        return Render(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
 
     def queue(renders: RenderQueue) -> BatchQueue:
         members: Any = lambda batch, body: Faulty(batch, renderers)  # noqa: E731
@@ -97,7 +97,7 @@ def test_a_render_that_cannot_be_made_fails_alone(tmp_path: Path, stored: bool) 
 def test_a_batch_that_cannot_be_read_ends(tmp_path: Path) -> None:
     """Of an earlier server, whose document is not there any more."""
     renderers, store = Quick(), RenderStore(tmp_path)
-    ended = partial(Job, renderers, load=load)
+    ended = partial(Render, renderers, load=load)
 
     async def scenario() -> None:
         order = BatchOrder("b" * 32, "anna", 2, "[]", created_at=time.time())
@@ -122,8 +122,8 @@ def test_documents_of_batches_count_until_the_last_render_is_in_line(tmp_path: P
     note = {"note": "x" * MIB}  # which nobody reads
     body = folded({"scene": SCENE | note, "settings": {}})
 
-    def new_job(order: Order, document: bytes | None, packed: Any) -> Job:
-        return Job(renderers, order, load, document, PACKED)  # type: ignore[arg-type]
+    def new_job(order: Order, document: bytes | None, packed: Any) -> Render:
+        return Render(renderers, order, load, document, PACKED)  # type: ignore[arg-type]
 
     def members(batch: Batch, body: bytes) -> RealMembers:
         made = RealMembers(batch, body, reader, new_job)
@@ -168,7 +168,7 @@ def test_batches_under_way_have_no_more_renders_than_are_kept(tmp_path: Path) ->
         limits = replace(LIMITS, retention=replace(LIMITS.retention, kept=3))
         renders = RenderQueue(limits, RenderStore(tmp_path))
         members: Any = lambda batch, body: Members(batch, renderers)  # noqa: E731
-        batches = BatchQueue(renders, members, lambda order, outcome: Job(renderers, order, load), 2)  # type: ignore[arg-type]
+        batches = BatchQueue(renders, members, lambda order, outcome: Render(renderers, order, load), 2)  # type: ignore[arg-type]
 
         async def submit(id: str, owner: str, count: int) -> None:
             order = BatchOrder(f"{id:0<32}", owner, count, json.dumps([{"turntable": count}]))
@@ -197,11 +197,11 @@ def test_an_ended_render_is_a_row_until_somebody_looks_at_it(tmp_path: Path) -> 
     """In the server that rendered it, and in the next one."""
     renderers, store = Quick(), RenderStore(tmp_path)
 
-    def made(stored: StoredRender) -> Job:
-        return Job(renderers, stored.order, load, outcome=stored.outcome)  # type: ignore[arg-type]
+    def made(stored: StoredRender) -> Render:
+        return Render(renderers, stored.order, load, outcome=stored.outcome)  # type: ignore[arg-type]
 
-    def ended(order: Order, outcome: Outcome) -> Job:
-        return Job(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
+    def ended(order: Order, outcome: Outcome) -> Render:
+        return Render(renderers, order, load, outcome=outcome)  # type: ignore[arg-type]
 
     async def looked_at(renders: RenderQueue, batches: BatchQueue, batch: Batch) -> None:
         id = member_id(batch.id, 2)

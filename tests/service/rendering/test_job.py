@@ -26,8 +26,8 @@ from service.ipc.messages import (
 from service.ipc.task_control import Stop, TakeCheckpoint
 from service.pack import Packed
 from service.problems import Conflict, Internal
-from service.server.renders.job import Job
 from service.server.renders.recorder import MOST_STARTS, Recorder
+from service.server.renders.render import Render
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore
 from service.server.storage.asset_access import NO_USES
@@ -36,10 +36,10 @@ from tests.service.rendering.fakes import SETTINGS, Renderers, load, until
 SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])
 
 
-async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = None) -> Job:
+async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = None) -> Render:
     order = Order("id", "", SETTINGS, bytes=8)
     number = await store.insert(order, outcome or Outcome(), b"document", NO_USES)
-    job = Job(renderers, order, load, outcome=outcome)
+    job = Render(renderers, order, load, outcome=outcome)
     job.recorder = Recorder(store, number, "id", renderers=renderers)
     return job
 
@@ -48,7 +48,7 @@ def scenario(test: Callable[[Any, RenderStore], Awaitable[None]], folder: Path) 
     asyncio.run(test(Renderers(), RenderStore(folder)))  # type: ignore[arg-type]
 
 
-async def in_line(job: Job) -> None:
+async def in_line(job: Render) -> None:
     """Give it a slot whenever it wants one, until it has ended."""
     while not job.finished.is_set():
         if job.reserve():
@@ -130,7 +130,7 @@ def test_a_render_that_servers_do_not_survive_fails(tmp_path: Path) -> None:
         assert (left.outcome.state, left.outcome.starts) == ("running", MOST_STARTS)
         await job.close()
         await running
-        again = Job(renderers, left.order, load, outcome=left.outcome)
+        again = Render(renderers, left.order, load, outcome=left.outcome)
         again.recorder = Recorder(store, left.number, "id")
         await again.run()
         await again.recorded()
@@ -237,7 +237,7 @@ def test_its_key_is_its_client(tmp_path: Path) -> None:
 
     async def test(renderers: Any, store: RenderStore) -> None:
         for owner in ("anna", ""):
-            job = Job(renderers, Order("id", owner, SETTINGS), load, b"document")
+            job = Render(renderers, Order("id", owner, SETTINGS), load, b"document")
             running = asyncio.create_task(job.run())
             await until(lambda owner=owner: renderers.clients[-1:] == [owner])
             job.cancel()

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from service.server.renders.recent import RECENT_S
-from service.server.renders.slots import Slots
+from service.server.renders.slots import RECENT_S, Slots
 from tests.counting import in_simulated_time
 from tests.service.rendering.in_line import Clock, Fake, add, later, scenario, settled
 

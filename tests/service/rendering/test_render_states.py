@@ -26,11 +26,11 @@ from service.ipc.messages import (
 )
 from service.problems import Conflict, ServiceError, Unavailable
 from service.server.renders import queue as queues
-from service.server.renders import rendering, slots, viewer
-from service.server.renders.job import Job
-from service.server.renders.life import Ended, Life, PictureAt, Tracing
+from service.server.renders import render, slots, viewer
 from service.server.renders.queue import RenderQueue
 from service.server.renders.recorder import Recorder
+from service.server.renders.render import Render
+from service.server.renders.states import Ended, PictureAt, Tracing
 from service.server.renders.store import rows
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore
@@ -48,7 +48,7 @@ LATE = 8  # steps, after which it may end: nearly nothing happens to a render th
 
 
 def diagram() -> set[tuple[str, str, str]]:
-    """The arrows of the diagram: from, to, and the method of Life."""
+    """The arrows of the diagram: from, to, and the method of Render."""
     return set(ARROW.findall((ROOT / "docs" / "house.md").read_text()))
 
 
@@ -91,7 +91,7 @@ class RenderMachine(RuleBasedStateMachine):
         farm: Any = self.farm
         self.queue.resume(
             self.store.load(),
-            lambda stored: Job(farm, stored.order, load, outcome=stored.outcome, budget=self.budget),
+            lambda stored: Render(farm, stored.order, load, outcome=stored.outcome, budget=self.budget),
         )
         self.job = self.queue.get("id")
 
@@ -115,15 +115,15 @@ class RenderMachine(RuleBasedStateMachine):
         if not self.store.failures and not self.store.full:
             with closing(sqlite3.connect(self.folder / FILE)) as file:
                 (row,) = rows.stored_renders(file)
-            if isinstance(job.life.state, Ended):
-                assert row.outcome.state == job.life.state.how
+            if isinstance(job.at, Ended):
+                assert row.outcome.state == job.at.how
                 self.ended = row.outcome.state
             else:
                 assert row.outcome.state in ("queued", "running")
 
     @property
     def tracing(self) -> bool:
-        return isinstance(self.job.life.state, Tracing) and self.job.task in self.farm.samples
+        return isinstance(self.job.at, Tracing) and self.job.task in self.farm.samples
 
     @precondition(lambda self: self.job.task is not None and self.job.state == "queued")
     @rule()
@@ -192,7 +192,7 @@ class RenderMachine(RuleBasedStateMachine):
     def disk(self, full: bool) -> None:
         self._says(lambda task: setattr(self.store, "full", full))
 
-    @precondition(lambda self: self.steps > LATE and not self.job.rendering.ends)
+    @precondition(lambda self: self.steps > LATE and not self.job.ends)
     @rule()
     def is_cancelled(self) -> None:
         self._says(lambda task: self.queue.cancel(self.job))
@@ -282,23 +282,23 @@ def arrows(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[tuple[str, str, str]
     seen, known = set[tuple[str, str, str]](), diagram()
 
     def watched(name: str) -> Callable[..., None]:
-        method = getattr(Life, name)
+        method = getattr(Render, name)
 
-        def run(life: Life, *args: Any) -> None:
-            before = type(life.state).__name__ if hasattr(life, "outcome") else "[*]"
-            method(life, *args)
-            after = type(life.state).__name__
+        def run(job: Render, *args: Any) -> None:
+            before = type(job.at).__name__ if hasattr(job, "outcome") else "[*]"
+            method(job, *args)
+            after = type(job.at).__name__
             if before != after:
                 seen.add((before, after, name))
                 assert (before, after, name) in known, "the diagram in docs/house.md has no such arrow"
 
         return run
 
-    for name in ("load", "trace", "requeue", "end", "close"):
-        monkeypatch.setattr(Life, name, watched(name))
+    for name in ("load", "trace", "requeue", "end"):
+        monkeypatch.setattr(Render, name, watched(name))
     for module, name, value in (
         (slots, "LOOK_S", 0.002), (slots, "AGAIN_S", 0.002), (viewer, "PATIENCE_S", 0.01),
-        (rendering, "GIVING_WAY_S", 0.1), (queues, "CLOSING_S", 0.1),
+        (render, "GIVING_WAY_S", 0.1), (queues, "CLOSING_S", 0.1),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     yield seen
@@ -344,7 +344,7 @@ def test_a_renderer_that_is_lost_after_the_end_takes_nothing_with_it(tmp_path: P
     async def scenario() -> None:
         store, farm = Disk(tmp_path), Farm()
         order = Order("id", "", SETTINGS, bytes=8)
-        job: Any = Job(farm, order, load)  # type: ignore[arg-type]
+        job: Any = Render(farm, order, load)  # type: ignore[arg-type]
         job.recorder = Recorder(store, await store.insert(order, Outcome(), b"document", NO_USES), "id")
         running = asyncio.create_task(job.run())
         await until(lambda: 1 in farm.samples)

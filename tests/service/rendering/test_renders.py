@@ -31,7 +31,7 @@ class Job:
         self.state, self.recorder, self.lasting, self.shown = "queued", None, True, False
         self.place, self.memory_share, self.lacks, self.elapsed_s, self.can_give_way = 0, 0.0, 0, 0.0, False
         self.finished, self.released, self.packed = asyncio.Event(), False, True
-        self.changes, self.rendering = Changes[Any](), SimpleNamespace(died=None)
+        self.changes, self.scene, self.died = Changes[Any](), self, None
 
     async def run(self) -> None:
         self.state = "running"

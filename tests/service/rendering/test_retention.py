@@ -15,8 +15,8 @@ from service.config import MIB, Config
 from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import Gone, TooManyRequests, Unavailable
 from service.server.renders.documents import WaitingDocuments
-from service.server.renders.job import Job
 from service.server.renders.queue import RenderQueue
+from service.server.renders.render import Render
 from service.server.renders.retention import KeptRenders, Retention
 from service.server.renders.status import status
 from service.server.renders.store.record import Order, Outcome
@@ -91,7 +91,7 @@ def test_renders_of_batches_count_too() -> None:
 def test_documents_that_wait_are_divided_among_the_keys() -> None:
     documents, jobs = (
         WaitingDocuments(64 * MIB),
-        [Job(Renderers(), Order(f"{i}", "a", SETTINGS), load) for i in range(3)],
+        [Render(Renderers(), Order(f"{i}", "a", SETTINGS), load) for i in range(3)],
     )  # type: ignore[arg-type]
     documents.take(jobs[0], 10 * MIB)
     with pytest.raises(TooManyRequests, match="SUNBOX_DATA_QUOTA"):
@@ -116,10 +116,10 @@ class Disk:
         self.queue = RenderQueue(replace(LIMITS, running=1, disk_bytes=QUOTA), self.store)
         self._count = 0
 
-    async def submit(self, owner: str, size: int) -> Job:
+    async def submit(self, owner: str, size: int) -> Render:
         self._count += 1
         order = Order(f"{owner}{self._count}", owner, SETTINGS, bytes=size)
-        job = Job(Renderers(), order, load, np.random.default_rng(self._count).bytes(size))  # type: ignore[arg-type]
+        job = Render(Renderers(), order, load, np.random.default_rng(self._count).bytes(size))  # type: ignore[arg-type]
         await self.queue.submit(job)
         return job
 
@@ -195,7 +195,7 @@ def test_what_is_deleted_is_gone_from_everywhere(tmp_path: Path) -> None:
         disk = Disk(tmp_path)
         asset = disk.upload("a")
         order = Order("id", "a", SETTINGS, bytes=8)
-        job: Any = Job(Renderers(), order, load, b"document")  # type: ignore[arg-type]
+        job: Any = Render(Renderers(), order, load, b"document")  # type: ignore[arg-type]
         await disk.queue.submit(job, AllowedUses("a", (asset,)))
         disk.queue.cancel(job)
         saved = SavedPicture(8, (0, 0, 0), [np.zeros(64, np.uint8)])

@@ -17,11 +17,10 @@ from service.document.quality import ResolvedSettings
 from service.ipc.messages import Done, Progress, SavedPicture, View
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.renderers.local.supervisor import Supervisor
-from service.server.renders import preemption, slots
-from service.server.renders.job import Job
-from service.server.renders.preemption import giving_way
+from service.server.renders import slots
 from service.server.renders.queue import RenderQueue
-from service.server.renders.recent import RECENT_S
+from service.server.renders.render import Render
+from service.server.renders.slots import RECENT_S, giving_way
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore
 from service.server.storage.asset_access import NO_USES
@@ -61,9 +60,9 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
             await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", NO_USES)
         queue = RenderQueue(replace(LIMITS, running=8), store)
         budget.cache("pictures", lambda: 0, queue.resting.shrink)
-        made = lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
+        made = lambda stored: Render(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
         queue.resume(store.load(), made)
-        stranger = Job(renderers, Order("stranger", "", SETTINGS), load, b"small", PACKED, budget=MemoryBudget())  # type: ignore[arg-type]
+        stranger = Render(renderers, Order("stranger", "", SETTINGS), load, b"small", PACKED, budget=MemoryBudget())  # type: ignore[arg-type]
         await queue.submit(stranger, listed=False)
         await until(stranger.finished.is_set)
         jobs = (await queue.page()).renders
@@ -85,7 +84,7 @@ def test_what_waits_for_memory_has_neither_memory_nor_a_slot(tmp_path: Path) -> 
         await store.insert(Order("a", "", SETTINGS, bytes=8), Outcome("running"), b"document", NO_USES)
         queue = RenderQueue(replace(LIMITS, running=1), store)
         budget.hold("scenes", queue, 3 * PICTURE - 1)
-        queue.resume(store.load(), lambda stored: Job(Renderers(), stored.order, load, budget=budget))  # type: ignore[arg-type]
+        queue.resume(store.load(), lambda stored: Render(Renderers(), stored.order, load, budget=budget))  # type: ignore[arg-type]
         assert (queue.running, queue.queued, budget.used()["pictures"]) == (0, 1, 0)
         await queue.close()
 
@@ -227,9 +226,9 @@ def test_nobody_gives_way_for_nothing() -> None:
     assert [each.id for each in giving_way(waiting, other, 0, 0)] == ["a2"]
     assert giving_way(waiting, other, 0, 1000) == []
     assert giving_way(waiting, other[:1], 0, 0) == []  # each would have one, in turns that are shorter than WAIT_S
-    other[0].elapsed_s = preemption.WAIT_S
+    other[0].elapsed_s = slots.WAIT_S
     assert giving_way(waiting, other[:1], 0, 0) == other[:1]
-    waiting.elapsed_s = preemption.WAIT_S / 2 + 1
+    waiting.elapsed_s = slots.WAIT_S / 2 + 1
     assert giving_way(waiting, other[:1], 0, 0) == []
 
 
@@ -251,13 +250,13 @@ def test_what_gave_way_ends_with_the_same_bits(
         await supervisor.ready(30)
         queue = RenderQueue(replace(LIMITS, running=1), RenderStore(tmp_path))
         job = {
-            id: Job(supervisor, Order(id, owner, LONG, bytes=8), load, b"document", PACKED)
+            id: Render(supervisor, Order(id, owner, LONG, bytes=8), load, b"document", PACKED)
             for id, owner in (("undisturbed", "a"), ("a0", "a"), ("b0", "b"))
         }
         try:
             await queue.submit(job["undisturbed"])
             await job["undisturbed"].finished.wait()
-            monkeypatch.setattr(preemption, "WAIT_S", 0.0)
+            monkeypatch.setattr(slots, "WAIT_S", 0.0)
             await queue.submit(job["a0"])
             await until(lambda: job["a0"].outcome.progress.samples >= 20)
             await queue.submit(job["b0"])
@@ -286,7 +285,7 @@ def test_a_render_that_ends_while_it_is_to_give_way_has_ended(tmp_path: Path) ->
     async def scenario() -> None:
         renderers: Any = Renderers()
         queue = RenderQueue(replace(LIMITS, running=1), RenderStore(tmp_path))
-        job = Job(renderers, Order("id", "a", SETTINGS, bytes=8), load, b"document", PACKED)
+        job = Render(renderers, Order("id", "a", SETTINGS, bytes=8), load, b"document", PACKED)
         await queue.submit(job)
         await until(lambda: renderers.sent)
         job.outcome = Outcome("running", progress=Progress(4, None, 2.0))

@@ -18,8 +18,8 @@ from service.document.document import Parsed
 from service.pack import Packed
 from service.problems import InvalidDocument
 from service.server.renders import slots
-from service.server.renders.job import Job
 from service.server.renders.queue import RenderQueue
+from service.server.renders.render import Render
 from service.server.renders.scene import PackedScenes
 from service.server.renders.store.check import check_renders
 from service.server.renders.store.record import Order, Outcome
@@ -56,7 +56,7 @@ def test_a_document_is_stored_once_and_each_render_has_its_own_scene(tmp_path: P
         for number, patch in enumerate(map(folded, PATCHES)):
             order = Order(f"{number}", "", SETTINGS, bytes=len(patch) if number else len(base))
             first = queue.get("0").number if number else None
-            await queue.submit(Job(renderers, order, load, base, patch=patch, base=first))  # type: ignore[arg-type]
+            await queue.submit(Render(renderers, order, load, base, patch=patch, base=first))  # type: ignore[arg-type]
         assert documents(tmp_path) == 1 and rendered == []
         report = Report()
         assert check_renders(tmp_path, report) == 3 and report.faults == []
@@ -64,7 +64,7 @@ def test_a_document_is_stored_once_and_each_render_has_its_own_scene(tmp_path: P
 
         store, renderers = RenderStore(tmp_path), Quick()  # the next server's
         queue = RenderQueue(LIMITS, store)
-        queue.resume(store.load(), lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome))  # type: ignore[arg-type]
+        queue.resume(store.load(), lambda stored: Render(renderers, stored.order, load, outcome=stored.outcome))  # type: ignore[arg-type]
         jobs = (await queue.page()).renders
         await until(lambda: all(job.state == "done" for job in jobs))
         scenes = [merge_patch(SCENE, patch) for patch in PATCHES]
@@ -115,11 +115,11 @@ def test_what_waits_is_packed_once_where_there_is_room(tmp_path: Path, monkeypat
     async def scenario() -> None:
         renderers: Any = Quick()
         queue = RenderQueue(LIMITS, RenderStore(tmp_path))
-        one = Job(renderers, Order("size", "", SETTINGS), load, b"", PACKED).scene.memory.scene_bytes
+        one = Render(renderers, Order("size", "", SETTINGS), load, b"", PACKED).scene.memory.scene_bytes
         waiting = PackedScenes(2 * one)
         renderers.hopeless = True
         jobs = [
-            Job(renderers, Order(id, "", SETTINGS), load, id.encode(), PACKED, waiting=waiting)
+            Render(renderers, Order(id, "", SETTINGS), load, id.encode(), PACKED, waiting=waiting)
             for id in ("first", "second", "no room", "cancelled")
         ]
         for job in jobs:
