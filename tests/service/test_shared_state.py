@@ -45,8 +45,8 @@ THREADS = 8
 # What modules change at run time, and why that is safe. Those of one thread: its own.
 CHANGED = {
     "renderers/ray/gateway.py _written": "appended to by one thread, and read as a whole",
-    "renders/store/fitting.py _adapters": "the same value under a key, whoever makes it",
-    "routes/idempotency.py _turns": "of the event loop",
+    "server/renders/store/fitting.py _adapters": "the same value under a key, whoever makes it",
+    "server/routes/idempotency.py _turns": "of the event loop",
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",

@@ -27,13 +27,13 @@ OTHERS = {
 # Tasks and threads that are begun elsewhere than in service/system/background.py: whoever begins them awaits them, or
 # says here why not.
 AWAITED = {
-    "verdict/comparison.py", "http/downloads.py", "streams/stream.py", "renderers/ray/lane.py", "routes/compare.py",
-    "routes/bsdf.py", "routes/batch_files.py", "storage/quota.py", "routes/stream.py", "routes/waiting.py",
-    "routes/events.py",
+    "server/verdict/comparison.py", "server/http/downloads.py", "server/streams/stream.py", "renderers/ray/lane.py",
+    "server/routes/compare.py", "server/routes/bsdf.py", "server/routes/batch_files.py", "server/storage/quota.py",
+    "server/routes/stream.py", "server/routes/waiting.py",
+    "server/routes/events.py",
     "renderers/ray/carriage.py",  # a future that each user of the scene awaits
     "renderers/ray/gateway.py",  # lanes, whose end `_finished` reports; a thread, whose end the hook does
-    "commands/documents.py",  # a thread of a command, whose end the hook reports
-    "bench/scale_costs.py",
+    "cli/documents.py",  # a thread of a command, whose end the hook reports
 }  # fmt: skip
 
 
@@ -52,7 +52,9 @@ def test_all_that_nobody_awaits_is_begun_in_one_place() -> None:
             name = getattr(node.func, "attr", getattr(node.func, "id", "")) if isinstance(node, ast.Call) else ""
             if name in ("create_task", "ensure_future", "Thread", "Timer"):
                 begun.add(str(path.relative_to(SERVICE)))
-    assert begun == AWAITED | {"system/background.py", "app.py"}, "app.py has a timer that ends the process"
+    assert begun == AWAITED | {"system/background.py", "server/app.py"}, (
+        "server/app.py has a timer that ends the process"
+    )
 
 
 def names() -> set[str]:
