@@ -3,6 +3,7 @@
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "math/constants.glsl"
 #include "accumulate/accumulators.glsl"
+#include "accumulate/splats_mean.glsl"
 #include "tonemap/linear.glsl"
 #include "tonemap/exponential.glsl"
 #include "tonemap/reinhard.glsl"
@@ -15,6 +16,10 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 pixe
 #else
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 #endif
+// A guess at what the picture shows, which is added to its sums.
+layout(std430, binding = GUESS_SLOT_SUM) readonly buffer guess_sum_buffer { vec4 guess_sums[]; };
+layout(std430, binding = GUESS_SLOT_MOMENTS) readonly buffer guess_moment_buffer { vec4 guess_moments[]; };
+uniform uint guess_stride; // 1; 0 where there is no guess, and a single zero is bound in its place
 uniform uint count; // of the pixels that are bound, in whatever rows
 uniform float exposure; // factor
 
@@ -42,8 +47,13 @@ void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
     uint slot = g.y * uint(LINE) + g.x;
     if (slot >= count) return;
-    float n;
-    vec4 sum = accumulators_sum(slot, n), mean = n > 0.0 ? sum / n : vec4(0.0);
+    float own; // samples; `n` counts what the guess is worth, too
+    vec4 sum = accumulators_sum(slot, own) + guess_sums[slot * guess_stride], mean = vec4(0.0);
+    float n = own + guess_moments[slot * guess_stride].w;
+    if (n > 0.0) mean = sum / n;
+#if CAUSTICS
+    if (n > 0.0) mean.rgb += own / n * splats_mean(slot);
+#endif
     vec3 c = mean.a > 0.0 ? mean.rgb / mean.a : vec3(0.0);
     c = min(c * exposure, vec3(1e37)); // a picture of 1e20 lifted by 60 stops stays finite
     c = resolve_shown(c);

@@ -7,7 +7,7 @@ from gpu import layout
 from gpu.kernels import bodies_glsl, instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
 from gpu.kernels.words_glsl import unpacked
 from gpu.layout import CameraKind, LightKind, ShapeKind, Uniforms, bindings
-from gpu.layout.bindings import BlockSlot, Slot
+from gpu.layout.bindings import BlockSlot, GuessSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.pixel_layers import COVER_RANKS
 from gpu.layout.record import Record
@@ -108,6 +108,7 @@ def constants() -> str:
     out += [f"const uint MODEL_{model.name.upper()} = {model.number}u;" for model in MODELS]
     out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
+    out += [f"#define GUESS_SLOT_{s.name} {int(s)}" for s in GuessSlot]
     out.append(f"#define COVER_RANKS {COVER_RANKS}")
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
     out.append(f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}")

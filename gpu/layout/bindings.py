@@ -38,8 +38,9 @@ class Slot(IntEnum):
     LIGHT_SOURCES = 14
     # meter.comp
     METER_PLACES = 14
-    # resolve.comp: tables of displays and looks
+    # resolve.comp: tables of displays and looks, and light of lamps
     TABLES = 13
+    LIGHT_SUMS = 14
     # prior.comp, prior_warp.comp
     BEFORE = 13
     CHANGE = 14
@@ -53,6 +54,13 @@ class BlockSlot(IntEnum):
     SUM = 0
     COMPENSATION = 1
     MOMENTS = 2
+
+
+class GuessSlot(IntEnum):
+    """Binding points of the guess that a picture is shown with, in resolve.comp."""
+
+    SUM = 3
+    MOMENTS = 4
 
 
 UNIFORM_BLOCK = 0  # binding points of uniform blocks

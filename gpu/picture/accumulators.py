@@ -9,7 +9,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
-from gpu.layout.bindings import BlockSlot, Slot
+from gpu.layout.bindings import BlockSlot, GuessSlot, Slot
 from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture.blocks import Sums, merged, merged_moments
 from gpu.picture.dispatcher import Dispatcher
@@ -115,14 +115,33 @@ class Accumulators:
 
     def bind(self, kernel: Any, first: int, count: int) -> None:
         """Bind these pixels for a kernel that includes `accumulate/accumulators.glsl`."""
-        block = self.block if self.open else None
-        bind(kernel, self.total, block, self._zero, first, count, self.moment_scale)
+        self._bind_sums(kernel, self.total, self.block if self.open else {}, first, count)
 
-    def bind_alone(
-        self, total: dict[Slot, Any], beside: dict[Slot, Any] | None, kernel: Any, first: int, count: int
-    ) -> None:
-        """Bind other sums in their place, given as SUM and MOMENTS, and perhaps some that are added to them."""
-        bind(kernel, total, beside, self._zero, first, count, self.moment_scale)
+    def bind_alone(self, sums: dict[Slot, Any], kernel: Any, first: int, count: int) -> None:
+        """Bind other sums in their place, given as SUM and MOMENTS."""
+        self._bind_sums(kernel, sums, {}, first, count)
+
+    def bind_guess(self, guess: dict[Slot, Any], kernel: Any, first: int, count: int) -> None:
+        """Bind a guess for resolve.comp, which adds it to the sums; it is SUM and MOMENTS, or empty."""
+        for slot, place in _GUESS.items():
+            self._bind_at(place, guess.get(slot), first, count)
+        kernel["guess_stride"].value = int(bool(guess))
+
+    def _bind_sums(self, kernel: Any, total: dict[Slot, Any], block: dict[Slot, Any], first: int, count: int) -> None:
+        for slot, place in _BESIDE.items():
+            self._bind_at(slot, total.get(slot), first, count)
+            self._bind_at(place, block.get(slot), first, count)
+        for name, value in (("block_stride", int(bool(block))), ("moment_scale", self.moment_scale)):
+            uniform = kernel.get(name, None)  # a kernel without moments lacks this uniform
+            if uniform is not None:
+                uniform.value = value
+
+    def _bind_at(self, place: int, buffer: Any, first: int, count: int) -> None:
+        """Bind these pixels of a buffer, or a zero where there is none."""
+        if buffer is None:
+            self._zero.bind_to_storage_buffer(int(place))
+        else:
+            buffer.bind_to_storage_buffer(int(place), offset=VECTOR_BYTES * first, size=VECTOR_BYTES * count)
 
     def means(self, first: int, count: int) -> np.ndarray:
         """Mean radiance and alpha of pixels [first, first + count): (count, 4) float32, as `accumulators_sum`
@@ -188,26 +207,8 @@ class Accumulators:
         buffers.clear()
 
 
-def bind(
-    kernel: Any, total: dict[Slot, Any], block: dict[Slot, Any] | None, zero: Any, first: int, count: int,
-    moment_scale: float,
-) -> None:  # fmt: skip
-    """Bind pixels [first, first + count) for a kernel that includes `accumulate/accumulators.glsl`; `zero` where
-    there is no buffer."""
-    for slot in ACCUMULATORS:
-        places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block.get(slot))
-        for place, buffer in places:
-            if buffer is None:
-                zero.bind_to_storage_buffer(place)
-            else:
-                buffer.bind_to_storage_buffer(place, offset=VECTOR_BYTES * first, size=VECTOR_BYTES * count)
-    for name, value in (("block_stride", int(block is not None)), ("moment_scale", moment_scale)):
-        uniform = kernel.get(name, None)  # a kernel without moments lacks this uniform
-        if uniform is not None:
-            uniform.value = value
-
-
 _BESIDE = dict(zip(ACCUMULATORS, BlockSlot, strict=True))
+_GUESS = {Slot.SUM: GuessSlot.SUM, Slot.MOMENTS: GuessSlot.MOMENTS}
 
 
 def _beside(block: dict[Slot, Any]) -> dict[Any, Any]:

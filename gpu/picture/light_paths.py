@@ -135,12 +135,21 @@ class LightPaths:
     def _unit(self) -> float:
         return float(self._dispatcher.scene.arrays.radiance_scale) / SPLAT_UNITS
 
+    @property
+    def _scale(self) -> float:
+        """What a pixel's sums are times in the mean; they are 0 before there is a path."""
+        return self._unit * self._pixels / max(self.even + self.odd, 1)
+
     def radiance(self, first: int, count: int) -> np.ndarray:
         """What they bring to pixels [first, first + count) in the mean: (count, 3) float32."""
-        if not self.on or self.even + self.odd == 0:
+        if not self.on:
             return np.zeros((count, 3), np.float32)
-        scale = self._unit * self._pixels / (self.even + self.odd)
-        return (self._numbers(first, count)[:, :3] * scale).astype(np.float32)
+        return (self._numbers(first, count)[:, :3] * self._scale).astype(np.float32)
+
+    def bind(self, kernel: Any, first: int, count: int) -> None:
+        """Bind these pixels for a kernel that includes `accumulate/splats_mean.glsl`."""
+        self._sums.bind_to_storage_buffer(int(Slot.LIGHT_SUMS), offset=SPLAT_BYTES * first, size=SPLAT_BYTES * count)
+        kernel["light_scale"].value = self._scale
 
     def squared_error(self) -> tuple[np.ndarray, np.ndarray]:
         """The luminance that they bring to each pixel, and an unbiased estimate of its squared error from a single

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -82,24 +82,26 @@ class Readout:
         self, look: Look, dtype: str, color: np.ndarray | None, prior: Prior | None, samples: int
     ) -> np.ndarray:
         """Colour as `Picture.display` gives it, of a picture with that many samples."""
-        d = self._dispatcher
-        own: dict[Slot, Any] = {}
-        bind = self._sums.bind
-        together = color is None and prior is not None and samples > 0 and not self._light.on and not self._sums.open
-        if samples and color is None and (self._light.on or prior is not None) and not together:
-            color = self.color()
-        if together:
-            assert prior is not None
-            bind = partial(self._sums.bind_alone, self._sums.total, prior.guess)
-        elif color is not None:
-            weight = 1 if prior is None else samples
+        d, own = self._dispatcher, dict[Slot, Any]()
+        guess = {} if prior is None else prior.guess
+        bind_sums: Callable[[Any, int, int], None] = self._sums.bind
+        caustics = color is None and samples > 0 and self._light.on
+        if color is not None:
+            weight = samples if guess else 1
             given = {Slot.SUM: color * np.float32(weight), Slot.MOMENTS: np.full_like(color, weight)}
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
-            bind = partial(self._sums.bind_alone, own, None if prior is None else prior.guess)
-        elif prior is not None:
-            bind = partial(self._sums.bind_alone, prior.guess, None)
+            bind_sums = partial(self._sums.bind_alone, own)
+        elif samples == 0:
+            bind_sums, guess = partial(self._sums.bind_alone, guess), {}
+
+        def bind(kernel: Any, first: int, count: int) -> None:
+            bind_sums(kernel, first, count)
+            self._sums.bind_guess(guess, kernel, first, count)
+            if caustics:
+                self._light.bind(kernel, first, count)
+
         count = self._size[0] * self._size[1]
-        pixels = resolve(d.context, self._kernels, d.scene.looks, bind, count, d.most_pixels, look, dtype)
+        pixels = resolve(d.context, self._kernels, d.scene.looks, bind, count, d.most_pixels, look, dtype, caustics)
         for buffer in own.values():
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)

@@ -19,9 +19,10 @@ from gpu.picture.schedule import work_groups
 _LINE = 1024  # pixels in a row of resolve.comp's invocations
 
 
-def defines(look: Look, dtype: str) -> dict[str, object]:
-    """The defines that resolve.comp is compiled with."""
-    return features.defines(frozenset()) | look.defines | {"OUTPUT_FLOAT": int(dtype == "f4"), "LINE": _LINE}
+def defines(look: Look, dtype: str, caustics: bool = False) -> dict[str, object]:
+    """The defines that resolve.comp is compiled with; `caustics` are those that were traced from the lights."""
+    more = {"OUTPUT_FLOAT": int(dtype == "f4"), "LINE": _LINE, "CAUSTICS": int(caustics)}
+    return features.defines(frozenset()) | look.defines | more
 
 
 def resolve(
@@ -33,11 +34,12 @@ def resolve(
     most: int,
     look: Look,
     dtype: str,
+    caustics: bool,
 ) -> np.ndarray:
     """(`pixels`, 4) exposed, tone-mapped, encoded: uint8, or float32 with dtype "f4". `bind(kernel, first, count)`
-    binds the sums of at most `most` pixels."""
+    binds the sums of at most `most` pixels, and those of `caustics`."""
     floats = dtype == "f4"
-    kernel = kernels.get("resolve.comp", defines(look, dtype))
+    kernel = kernels.get("resolve.comp", defines(look, dtype, caustics))
     look.set_uniforms(kernel)
     taken = None
     if look.key:

@@ -114,7 +114,8 @@ def common_keys() -> list[KernelKey]:
     """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, those that show a
     picture, and the one that reads nothing."""
     shown = [
-        ("resolve.comp", resolve.defines(Look(tone_map=curve), dtype))
+        ("resolve.comp", resolve.defines(Look(tone_map=curve), dtype, caustics))
+        for caustics in (False, True)
         for curve in TONE_MAPS
         for dtype in ("u1", "f4")
     ]

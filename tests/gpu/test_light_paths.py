@@ -111,6 +111,45 @@ def test_the_noise_counts_both(made: Callable[[int], Picture]) -> None:
     assert one.display().shape == (37, 48, 4) and one.read("variance").max() > 0
 
 
+@pytest.mark.parametrize("caustics", ["light", "paths"])
+@pytest.mark.parametrize("most", [None, 480], ids=["whole", "parts"])
+def test_a_frame_is_put_together_on_the_device(
+    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, caustics: str, most: int | None
+) -> None:
+    """As from what is read, summed in numpy and shown in the picture's place: the same bits, but with a guess, which
+    is averaged in another order. From 9 samples on a block is open."""
+    made = picture(gpu, scene(), 0, caustics=caustics, **SETTINGS)
+    if most:
+        monkeypatch.setattr(made._dispatcher, "most_pixels", most)
+    camera = made.scene.arrays.camera
+    rng = np.random.default_rng(5)
+    guess = gpu.prior(rng.random((37, 48, 4), np.float32), camera)
+    small = rng.random((10, 12, 4), np.float32)
+    guess.correct(camera, small, small, 4.0)
+    reads: list[str] = []
+    color = made._readout.color
+    monkeypatch.setattr(made._readout, "color", lambda: reads.append("color") or color())
+    for samples in (1, 3, 9, 20):
+        made.trace(600.0, samples)
+        assert made.samples == samples and made._sums.open is (samples > 8)
+        values = color()
+        for dtype in ("u1", "f4"):
+            np.testing.assert_array_equal(made.display(dtype=dtype), made.display(dtype=dtype, color=values))
+        found, expected = (made.display(dtype="f4", prior=guess, color=each) for each in (None, values))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)
+        found, expected = (made.display(prior=guess, color=each).astype(int) for each in (None, values))
+        assert np.abs(found - expected).max() <= 1
+        without = made.display(dtype="f4")
+        assert np.abs(without - made.display(dtype="f4", prior=guess)).max() > 0.01, "the guess counts"
+    if caustics == "light":
+        brought = made._light.radiance(0, 48 * 37)
+        alone = values.copy()
+        alone[..., :3] -= brought.reshape(37, 48, 3)
+        assert np.abs(made.display(color=alone).astype(int) - made.display()).max() > 10, "so do the caustics"
+    assert not reads, "nothing of it comes down"
+    guess.release()
+
+
 def arrays(document_: dict[str, Any]) -> Any:
     return pack(parse_scene(document_), Images()).arrays
 
