@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
+from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
-from gpu.layout.pixel_layers import COVER_VECTORS
+from gpu.layout.pixel_layers import COVER_VECTORS, VECTOR_BYTES
 from gpu.picture import noise_meter
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.coverage import Coverage
@@ -26,6 +27,13 @@ from gpu.picture.resolve import resolve
 from gpu.picture.schedule import Tile, work_groups
 
 _PIECE = 1 << 16  # pixels, a megabyte of each accumulator
+_READ = 1 << 20  # pixels that are read at once, 16 MB: few reads, for which the device needs little memory
+_LINE = 1024  # pixels in a row of mean.comp's invocations
+
+
+def mean_defines(caustics: bool) -> dict[str, object]:
+    """The defines that mean.comp is compiled with; `caustics` are those that were traced from the lights."""
+    return features.defines(frozenset()) | {"LINE": _LINE, "CAUSTICS": int(caustics)}
 
 
 class Readout:
@@ -48,12 +56,36 @@ class Readout:
 
     def color(self) -> np.ndarray:
         """Mean radiance and alpha: (height, width, 4) float32."""
+        summed = self._color_in_numpy() if self._dispatcher.is_software else self._color_on_the_device()
+        return summed.reshape(self._size[1], self._size[0], 4)
+
+    def _color_in_numpy(self) -> np.ndarray:
+        """(pixels, 4). On a processor it takes half the time of a kernel, whose result is one copy more."""
         mean = np.empty((self._size[0] * self._size[1], 4), np.float32)
         for first, count in self._pieces():
             mean[first : first + count] = self._sums.means(first, count)
             if self._light.on:
                 mean[first : first + count, :3] += self._light.radiance(first, count)
-        return mean.reshape(self._size[1], self._size[0], 4)
+        return mean
+
+    def _color_on_the_device(self) -> np.ndarray:
+        """The same bits. On an H200 numpy took 37 ms for 1920 x 1080 pixels; reading as many bytes takes 2.5 ms."""
+        d, pixels = self._dispatcher, self._size[0] * self._size[1]
+        kernel = self._kernels.get("mean.comp", mean_defines(self._light.on))
+        mean = np.empty((pixels, 4), np.float32)
+        most = min(pixels, _READ, d.most_pixels)
+        output = contexts.allocate(d.context, VECTOR_BYTES * most)
+        for first in range(0, pixels, most):
+            count = min(most, pixels - first)
+            self._sums.bind(kernel, first, count)
+            if self._light.on:
+                self._light.bind(kernel, first, count)
+            output.bind_to_storage_buffer(int(Slot.OUTPUT))
+            kernel["count"].value = count
+            contexts.dispatch(d.context, kernel, *work_groups(_LINE, -(-count // _LINE)))
+            output.read_into(mean[first : first + count].data, VECTOR_BYTES * count)
+        output.release()
+        return mean
 
     def variance(self) -> np.ndarray:
         """Variance of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""

@@ -18,7 +18,7 @@ from gpu.kernels import features
 from gpu.kernels.binaries import ENTRIES, binary_file
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
-from gpu.picture import accumulators, light_paths, noise_meter, resolve
+from gpu.picture import accumulators, light_paths, noise_meter, readout, resolve
 from gpu.picture.look import Look
 from gpu.settings import TONE_MAPS, RenderSettings
 
@@ -115,12 +115,12 @@ def common_keys() -> list[KernelKey]:
     picture, and the one that reads nothing."""
     shown = [
         ("resolve.comp", resolve.defines(Look(tone_map=curve), dtype, caustics))
-        for caustics in (False, True)
+        for dtype, caustics in (("u1", False), ("f4", False), ("u1", True))
         for curve in TONE_MAPS
-        for dtype in ("u1", "f4")
     ]
     metered = [("meter.comp", noise_meter.defines(*which)) for which in ((1, 0), (0, 0), (0, 1))]
     summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]
+    summed += [("mean.comp", readout.mean_defines(caustics)) for caustics in (False, True)]
     entries = [*metered, *summed, *shown, (blank.ENTRY, blank.DEFINES)]  # a stream's first frames need those first
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
 

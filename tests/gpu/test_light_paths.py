@@ -126,13 +126,16 @@ def test_a_frame_is_put_together_on_the_device(
     guess = gpu.prior(rng.random((37, 48, 4), np.float32), camera)
     small = rng.random((10, 12, 4), np.float32)
     guess.correct(camera, small, small, 4.0)
+    read = made._readout.color
     reads: list[str] = []
-    color = made._readout.color
-    monkeypatch.setattr(made._readout, "color", lambda: reads.append("color") or color())
+    monkeypatch.setattr(made._readout, "color", lambda: reads.append("color") or read())
     for samples in (1, 3, 9, 20):
         made.trace(600.0, samples)
         assert made.samples == samples and made._sums.open is (samples > 8)
-        values = color()
+        values = read()
+        with monkeypatch.context() as on_gpu:
+            on_gpu.setattr(made._dispatcher, "is_software", False)
+            np.testing.assert_array_equal(read(), values)
         for dtype in ("u1", "f4"):
             np.testing.assert_array_equal(made.display(dtype=dtype), made.display(dtype=dtype, color=values))
         found, expected = (made.display(dtype="f4", prior=guess, color=each) for each in (None, values))

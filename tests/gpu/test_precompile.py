@@ -219,7 +219,7 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
             compiler.hear()
         assert all(compiler.has(key) for key in common_keys())
         asked.append(helper.asked)
-    assert asked == [common_keys(), []] and len(common_keys()) == 30
+    assert asked == [common_keys(), []] and len(common_keys()) == 26
 
 
 def test_what_may_be_needed_some_time_waits_for_the_first_minute(gpu: Renderer, cold: Path) -> None:
