@@ -79,7 +79,7 @@ void direct_add(Surface s, Interaction here, LightSample light, Scatter f, float
     if (counts) {
         vec3 c = path.throughput * (f.f * light.radiance * (weight / light.pdf));
         c *= sides_eta_scale(path.eta_scale, side, s, light.t);
-        Medium medium = interaction_medium(across < 0.0, path.medium, here.beyond);
+        Medium medium = medium_again(interaction_medium(across < 0.0, path.medium, here.beyond));
         if (direct_arrives(path, light, medium, c)) path.radiance += path_clamp(c, path.bounce > path.passed) * share;
     }
 }

@@ -141,6 +141,16 @@ Medium medium_of(Bodies bodies) {
 }
 #endif
 
+// The same medium, anew from the numbers of its bodies where these give all of it: nothing else of it is in registers then
+// from where it was found to here.
+Medium medium_again(Medium m) {
+#if HAS_PRIORITIES && !BODIES_TEXTURED
+    return medium_of(m.bodies);
+#else
+    return m;
+#endif
+}
+
 Medium medium_sum(Medium a, Medium b, float times) {
     a.rate += times * b.rate;
     a.depth += times * b.depth;
@@ -255,5 +265,6 @@ Medium medium_at(vec3 from) {
 }
 #else
 Medium medium_outside() { return Medium(0.0); }
+Medium medium_again(Medium m) { return m; }
 Medium medium_at(vec3 from) { return medium_outside(); }
 #endif

@@ -81,6 +81,9 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
         Interaction here;
         Material m;
         if (delta_chain(rng, path, here, m)) {
+#if HAS_WALKS
+            walk_none(path);
+#endif
             Surface s = interaction_surface(here, hues_leading(m, path.hues));
             LightContext lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);

@@ -34,6 +34,7 @@ void path_trace(Sampler rng, inout Path path) {
     path.hit = transparency_nearest(path.o, path.d, path.at.flat_id, path.bounce, rng, path.at);
     path.alive = path.alive && budget_lasts();
     if (!path.alive) path.hit.id = NONE; // the last surface has ended it, or this ray its budget
+    if (!walk_goes_on(path)) path.medium = medium_again(path.medium);
     scatter_travel(rng, path);
     bool met = path.hit.id != NONE;
     path.cone = cone_after(path.cone, path.hit.t);

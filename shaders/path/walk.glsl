@@ -64,6 +64,13 @@ void walk_begin(Material m, inout Path path) {
     path.medium = walk_medium(m, 4.0 * dot(abs(path.at.ng), path.at.error)); // else the ray would begin deep within
 }
 
+// Forgets the walk before this one, where none is under way: it takes no registers then.
+void walk_none(inout Path path) {
+    path.walks = false;
+    path.steps = path.walk_shape = 0u;
+    path.outside = path.medium;
+}
+
 // Finds out whether the walk has come to its surface.
 void walk_arrive(inout Path path) {
     path.exits = path.walks && path.hit.id != NONE && !path.in_medium && path.at.shape == path.walk_shape
