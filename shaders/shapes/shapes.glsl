@@ -102,6 +102,9 @@ void shapes_loops(vec3 o, vec3 d, Shear shear, uvec2 skip, inout Hit hit) {
 }
 
 void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
+#if !HAS_BVH
+    budget_left--; // a tree counts what its rays come to
+#endif
     Shear shear = triangle_shear(o, d);
     shapes_loops(o, d, shear, skip, hit);
 #if HAS_BVH
@@ -155,8 +158,7 @@ SurfacePoint shapes_analytic_point(Hit hit, vec3 o, vec3 d) {
     uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
     vec3 p = o + hit.t * d;
     SurfacePoint r = shapes_none(p, -d);
-    // llvmpipe reads all kinds, whichever was hit: the index may be outside another kind's range, for which robust
-    // buffer access returns 0.
+    // Each kind is read behind a branch, as the index may be outside of another kind's range.
 #if HAS_SPHERES || HAS_BVH_SPHERES
     if (kind == SHAPE_SPHERE) r = sphere_point(sphere_pick(index), p);
 #endif

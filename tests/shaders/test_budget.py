@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gpu import Renderer
+from gpu.kernels.source import SHADERS
 from tests.extremes.scenes import icosphere
 from tests.rendering import document, picture
 
@@ -93,3 +95,17 @@ def test_where_a_path_is_cut_does_not_depend_on_its_neighbours(gpu: Renderer) ->
     while parts.samples < 4:
         parts.trace(0.0, parts.samples + 1)
     assert np.array_equal(whole.read(), parts.read()) and _cut(whole.warnings) == _cut(parts.warnings) == 256
+
+
+def test_rays_are_counted_where_there_is_no_tree(tmp_path: Path) -> None:
+    """In a box that reflects all light and glows with 1, a path meets as many surfaces as it has turns, but for the
+    last one. It needs a renderer of its own, whose paths have few turns."""
+    turns = 40
+    few = (SHADERS / "shapes/budget.glsl").read_text().replace("BUDGET_TURNS = 28672", f"BUDGET_TURNS = {turns}")
+    (tmp_path / "shapes").mkdir()
+    (tmp_path / "shapes/budget.glsl").write_text(few)
+    with Renderer(shaders=(tmp_path, SHADERS)) as renderer:
+        made = picture(renderer, document([ROOM], {"m": GLOW}, camera=INSIDE), 1, estimator="bsdf", **DEEP)
+        assert _cut(made.warnings) == 64
+        assert (made.read()[..., :3] == turns - 1).all()
+        made.release()
