@@ -180,6 +180,8 @@ def _current_context(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     renderer: FamilyRenderer = request.getfixturevalue("gpu")
+    if request.node.get_closest_marker("llvmpipe") and "llvmpipe" not in renderer.info["renderer"]:
+        pytest.skip("these bits are llvmpipe's alone")
     contexts.use(renderer.context)
     with renderer.exact() if request.node.get_closest_marker("exact") else nullcontext():
         yield

@@ -105,6 +105,7 @@ def test_an_empty_part_changes_no_bit() -> None:
         assert all(np.array_equal(a, b) for a, b in zip(both, some, strict=True))
 
 
+@pytest.mark.llvmpipe
 @pytest.mark.parametrize("radiance", [1.0, 1e-20, 1e20])
 def test_the_device_merges_as_numpy_does(gpu: Renderer, radiance: float) -> None:
     lit = {"type": "constant", "radiance": radiance}

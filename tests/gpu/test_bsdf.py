@@ -110,6 +110,7 @@ def test_values_are_the_formulas(gpu: Renderer, row: str) -> None:
 LAB_PLASTIC = {"diffuse": [0.7, 0.4, 0.1], "diffuse_model": "oren_nayar", "diffuse_roughness": 0.5}
 
 
+@pytest.mark.llvmpipe
 @pytest.mark.parametrize("row", seldom([*ALL, "microfacet"], ["iridescent glass"]))
 def test_lobes_add_up_to_the_values(gpu: Renderer, row: str) -> None:
     if row == "microfacet":

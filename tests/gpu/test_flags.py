@@ -149,6 +149,7 @@ def test_no_slider_of_the_camera_asks_for_another_kernel() -> None:
     assert "HAS_APERTURE" not in flags(before)
 
 
+@pytest.mark.llvmpipe
 def test_the_code_of_the_aperture_changes_no_bit_of_a_pinhole(gpu: Renderer) -> None:
     """A stream has it compiled in; the picture that a render makes of the same scene has the same bits."""
     document = made_of({"type": "diffuse", "albedo": 0.5}, ball("m"))

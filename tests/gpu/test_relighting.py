@@ -51,6 +51,7 @@ PAIRS: dict[str, tuple[Doc, Doc]] = {
 }
 
 
+@pytest.mark.llvmpipe
 @pytest.mark.parametrize("pair", PAIRS)
 def test_another_environment_is_uploaded_and_nothing_else(gpu: Renderer, shelf: Shelf, pair: str) -> None:
     cache = PackCache()

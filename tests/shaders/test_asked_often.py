@@ -71,6 +71,7 @@ def test_matte_surfaces_gain(gpu: Renderer) -> None:
     assert often < 0.35 * once
 
 
+@pytest.mark.llvmpipe
 @pytest.mark.exact  # two texts of a kernel that LLVM rounds alike
 def test_mirrors_and_glass_are_not_asked_again(gpu: Renderer) -> None:
     """Their noise is from elsewhere: bit for bit what it was."""
@@ -78,6 +79,7 @@ def test_mirrors_and_glass_are_not_asked_again(gpu: Renderer) -> None:
         assert np.array_equal(*pictures(gpu, room(ball, ball), 4, max_bounces=4))
 
 
+@pytest.mark.llvmpipe
 def test_a_sky_that_is_the_same_everywhere_is_not_asked_again(gpu: Renderer) -> None:
     scene = room(MATTE)
     scene["environment"] = {"type": "constant", "radiance": 1}

@@ -66,6 +66,7 @@ def test_dispersive_glass_neither_gains_nor_loses(gpu: Renderer, roughness: floa
     assert (channels > 0.99).all() and (channels < 1.003).all()
 
 
+@pytest.mark.llvmpipe
 def test_an_abbe_number_that_no_path_meets_changes_no_bit(gpu: Renderer) -> None:
     behind = {**BALL, "center": [0, 0, 40], "material": "glass"}
     floor = {"type": "quad", "origin": [-3, -1, 3], "u": [6, 0, 0], "v": [0, 0, -6], "material": "floor"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from gpu import Renderer, RenderSettings
 from service.document import parse_scene
@@ -31,6 +32,7 @@ def crowd():
     return document(*shapes)
 
 
+@pytest.mark.llvmpipe
 def test_the_tree_finds_what_the_loops_find(gpu: Renderer, monkeypatch) -> None:
     seen = []
     for few, whole in ((0, 4096), (0, 0), (1, 4096), (10**6, 4096)):  # in treelets, too, and with some in the loop
