@@ -122,6 +122,7 @@ FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
 _FEW_MAX = 64
 _BLOCK_BYTES = 16384  # bytes that a uniform block may have with every driver
 PICK_MAX = 2
+UNIFORM_BLOCKS = 1  # 0: records that are few are in storage buffers, too (gpu/kernels/layout_glsl.py)
 
 
 def _loop(name: str) -> str:
@@ -194,6 +195,7 @@ def defines(
     out["SHADOW_MEDIA"] = int(ordered)
     out |= {"QUAD_LAMP": -1} | textures_glsl.defines(None) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
+    out["UNIFORM_BLOCKS"] = UNIFORM_BLOCKS
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)

@@ -24,8 +24,9 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
 
     Where a kernel knows the number of records, they are in a uniform block: llvmpipe loads from a block once for all
     lanes where the index is constant, as in unrolled loops, but from a storage buffer lane by lane wherever control
-    flow has diverged. Where the first shapes of a kind stand in a loop and the others in the tree, there are both,
-    and `NAME_tree_load(i)` reads any of them.
+    flow has diverged. UNIFORM_BLOCKS 0 makes a storage buffer of each, as blocks of GPUs are made for one index in
+    all lanes: `python -m tests.bench device --part blocks` measures both. Where the first shapes of a kind stand in a
+    loop and the others in the tree, there are both, and `NAME_tree_load(i)` reads any of them.
     """
     storage = _storage(name, record, slot, "words")
     if name not in bindings.COUNTED:
@@ -33,7 +34,7 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
     count, stride = f"{name.upper()}_COUNT", _stride(name, record)
     block = f"layout(std140, binding = {bindings.COUNTED[name]}) uniform {name}_block"
     lines = [
-        f"#if {count} > 0",
+        f"#if UNIFORM_BLOCKS && {count} > 0",
         f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
         "#else",
         storage,
@@ -57,7 +58,7 @@ _SHAPES = frozenset(kind.name.lower() for kind in ShapeKind if kind != ShapeKind
 
 def _split(name: str) -> str:
     """The condition under which a kernel's loop has some shapes of a kind and its tree the others."""
-    return f"{name.upper()}_COUNT > 0 && HAS_BVH_{layout.BUFFERS[name][1].name}"
+    return f"UNIFORM_BLOCKS && {name.upper()}_COUNT > 0 && HAS_BVH_{layout.BUFFERS[name][1].name}"
 
 
 def _stride(name: str, record: type[Record]) -> str:
@@ -79,6 +80,12 @@ def _load(name: str, record: type[Record], function: str, words: str) -> str:
         lines.append(f"    uvec{group} w{k} = {name}_{words}[i * {stride} + {k}u];")
     lines.append(f"    return {record.__name__}({unpacked(record, group)});\n}}")
     return "\n".join(lines)
+
+
+def _none(name: str, record: type[Record]) -> str:
+    """`NAME_none()`, a record of zeros."""
+    zeros = ", ".join(f"{kind.glsl}(0)" for kind in record.members.values())
+    return f"{record.__name__} {name}_none() {{ return {record.__name__}({zeros}); }}"
 
 
 def _picker(name: str, record: type[Record]) -> str:
@@ -167,6 +174,7 @@ def text() -> str:
     structs = [_struct(r) for r in dict.fromkeys(r for r, _ in layout.BUFFERS.values())]
     loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
+    loaders.append(f"#if ANY_CHAINS\n{_none('material', layout.Material)}\n#endif")
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     parts = [constants(), *structs, *loaders, nodes, _uniforms(), instances_glsl.text(), textures_glsl.text()]
     parts += [bodies_glsl.text(), models_glsl.predicates(), microfacets_glsl.text(), measured_glsl.text()]

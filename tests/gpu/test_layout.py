@@ -7,12 +7,14 @@ import pytest
 
 from gpu import Renderer, layout
 from gpu.device.textures import linear_texture
-from gpu.kernels import instances_glsl, layout_glsl
+from gpu.kernels import features, instances_glsl, layout_glsl
 from gpu.kernels.features import COUNTS, FEW, defines, everything
 from gpu.kernels.flag_table import FLAGS
+from gpu.kernels.source import KernelSource
 from gpu.layout import BUFFERS, bindings
 from gpu.layout.bindings import COUNTED
 from gpu.layout.record import LayoutError, Record, f32, vec3
+from tests.rendering import document, picture
 
 
 @pytest.mark.parametrize("name", [*BUFFERS, "instance"])
@@ -110,3 +112,20 @@ def test_every_flag_and_count_is_defined() -> None:
     known = defines(frozenset())
     assert {name for name in everything() if not FLAGS[name].of_settings} <= set(known)
     assert {*COUNTS, *FEW} == {f"{name.upper()}_COUNT" for name in COUNTED}
+
+
+@pytest.mark.llvmpipe
+def test_few_records_are_read_alike_from_storage_buffers(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernels of `python -m tests.bench device --part blocks`; two materials, a lamp, and shapes in loops."""
+    materials = {"m": {"type": "diffuse", "albedo": 0.5}, "lamp": {"type": "diffuse", "albedo": 0, "emission": 3}}
+    shapes = [
+        {"type": "box", "min": [-1, -1, -1], "max": [1, 1, 1], "material": "m"},
+        {"type": "sphere", "center": [0, 3, 2], "radius": 0.5, "material": "lamp"},
+    ]
+    seen, texts = [], set()
+    for blocks in (1, 0):
+        monkeypatch.setattr(features, "UNIFORM_BLOCKS", blocks)
+        made = picture(gpu, document(shapes, materials), 4)
+        texts.add(KernelSource("pathtrace.comp", made.scene.defines(made.settings)).text.split("void main")[0])
+        seen.append(made.read())
+    assert len(texts) == 2 and seen[0].any() and np.array_equal(*seen)

@@ -18,5 +18,6 @@ bits       the same bits however the work was cut
 moves      what moving a picture's memory takes
 floor      what a dispatch takes by pixels and samples
 yielding   what waiting for the device costs the processor
+blocks     records that are few in uniform blocks, or in storage buffers
 pair       one and two processes on the device
 """

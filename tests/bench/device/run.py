@@ -32,6 +32,7 @@ PARTS = {
     "moves": 15.0,
     "floor": 40.0,
     "yielding": 15.0,
+    "blocks": 25.0,
     "pair": 15.0,
 }
 OVERRUN = 1.5
