@@ -82,7 +82,9 @@ void main() {
 #endif
     Medium medium = medium_at(uniforms.camera.position);
     uint i = 0u, cut = 0u;
-    do {
+    // Not do ... while: compilers for GPUs would take out of that all that no sample changes, seeds above all, and keep it in
+    // registers for good.
+    while (i < count) {
         vec3 o, d;
         Sampler rng = sobol_begin(pixel, first + i, replicate);
         camera_ray(pixel, rng, o, d);
@@ -95,7 +97,8 @@ void main() {
         add_sample(slot, path_radiance(rng, o, d, medium));
         if (path_was_lost) break; // the driver has ended this loop as well
         if (path_was_cut) cut++;
-    } while (++i < count);
+        i++;
+    }
     cut += count - i;
     if (cut > 0u) atomicAdd(path_cut, cut);
 #if !ANY_CHAINS

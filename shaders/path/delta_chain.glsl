@@ -28,6 +28,9 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
 #else
     bool taken;
     do {
+        // Else the surface before this ray would be in registers while that is traced: the ray may find none to replace it.
+        here = interaction_none();
+        m = material_none();
         path_trace(rng, path);
         taken = false;
         if (path.alive) {

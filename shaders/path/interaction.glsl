@@ -26,6 +26,30 @@ struct Interaction {
 
 #include "path/scatter.glsl"
 
+#if ANY_CHAINS
+// That of no point, for path/delta_chain.glsl.
+Interaction interaction_none() {
+    Interaction r;
+    r.wo = r.front = r.fold = r.facing = r.coat = vec3(0.0);
+    r.behind = r.mapped = r.transmits = false;
+    r.basis = Basis(vec3(0.0), vec3(0.0), vec3(0.0));
+    r.tangent = vec2(0.0);
+    r.beyond = medium_none();
+#if HAS_PRIORITIES
+    r.around = 1.0;
+    r.sparser = false;
+#endif
+#if HAS_SCATTERING
+#if HAS_WALKS
+    r.exits = false;
+#endif
+    r.in_medium = false;
+    r.g = 0.0;
+#endif
+    return r;
+}
+#endif
+
 #if HAS_PRIORITIES
 // Finds what the body lies in: it is around the outer side of the surface.
 void interaction_around(Material m, bool clear, Medium near, inout Interaction here) {

@@ -264,7 +264,8 @@ Medium medium_at(vec3 from) {
     return medium_least(first, sum);
 }
 #else
-Medium medium_outside() { return Medium(0.0); }
+Medium medium_none() { return Medium(0.0); }
+Medium medium_outside() { return medium_none(); }
 Medium medium_again(Medium m) { return m; }
 Medium medium_at(vec3 from) { return medium_outside(); }
 #endif

@@ -15,6 +15,9 @@ BsdfSample path_shade(Surface s, Interaction here, Material m, LightContext cont
         if (own) path_weigh(f, next);
         // As loops, because llvmpipe runs the body of an `if` for rays that need it no longer, too.
         for (bool adds = !own; adds; adds = false) direct_add(s, here, light, f, share, path);
+        // Nothing of this turn is in registers in the next one.
+        light = lights_none();
+        asked = Asked(vec3(0.0), vec3(0.0), false, bsdf_rough_sample(vec3(0.0)));
         for (bool picks = turn < (1u << doublings); picks; picks = false) {
             light = direct_sample(context, sobol_part(rng, turn, doublings), path.bounce);
             asked = bsdf_ask(here, light.wi);
@@ -25,11 +28,16 @@ BsdfSample path_shade(Surface s, Interaction here, Material m, LightContext cont
     path_weigh(dispersion_eval(s, here, m, asked, path.hues), next);
 #if HAS_LIGHTS
     uint doublings = direct_doublings(s, path.bounce), turn = 0u;
+    // No loop where it has one turn: RADV keeps it all the same, and what it reads in registers to its end.
+#if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
     do {
+#endif
         LightSample light = direct_sample(context, sobol_part(rng, turn, doublings), path.bounce);
         Scatter f = dispersion_eval(s, here, m, bsdf_ask(here, light.wi), path.hues);
         direct_add(s, here, light, f, share, path);
+#if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
     } while (++turn < (1u << doublings));
+#endif
 #endif
 #endif
     return next;

@@ -68,7 +68,11 @@ def statistics(paths: Sequence[Path]) -> list[Statistics]:
     rows = [dict(zip(names[i : i + 6], values[i : i + 6], strict=True)) for i in range(0, len(names), 6)]
     return [
         Statistics(
-            row["VGPRs"], row["Spilled VGPRs"], row["Scratch size"], row["Subgroups per SIMD"], row["Code size"]
+            vgprs=row["VGPRs"],
+            spilled=row["Spilled VGPRs"],
+            scratch=row["Scratch size"],
+            waves=min(row["Subgroups per SIMD"], WAVES),  # Mesa 25.0 names more than a SIMD holds
+            code=row["Code size"],
         )
         for row in rows
     ]

@@ -13,12 +13,6 @@ from gpu.kernels.source import KernelSource
 from tests.bench import radv, registers
 from tests.bench.__main__ import main
 
-# Kernels that spill vector registers, or leave room for fewer waves, with the registers that they spill at most.
-WORSE = {
-    "candle": 40, "orange": 27, "perfume": 15, "ball of soap-film": 50, "whisky": 0, "water-glass": 0,
-    "ball of physically-based-beer-pale-lager": 0, "ball of physically-based-soap-bubble": 48,
-}  # fmt: skip
-
 pytestmark = pytest.mark.skipif(
     radv.driver() is None or shutil.which("glslangValidator") is None,
     reason="RADV or glslangValidator is not installed (Debian: mesa-vulkan-drivers libvulkan1 glslang-tools)",
@@ -66,5 +60,4 @@ def test_no_kernel_spills() -> None:
     """Of the library's materials and of the built-in scenes: some 60 kernels, two minutes."""
     rows = registers.measure(lambda line: None, [])
     assert len(rows) > 50
-    spilled = {row["name"]: row["spilled"] for row in rows if row["spilled"] or row["waves"] < registers.FEWEST_WAVES}
-    assert {name: most for name, most in spilled.items() if most > WORSE.get(name, -1)} == {}
+    assert [row for row in rows if row["spilled"] or row["waves"] < registers.FEWEST_WAVES] == []

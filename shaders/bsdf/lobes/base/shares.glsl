@@ -78,7 +78,10 @@ vec3 shares_loss(Surface s, vec4 albedo, bool inside, SharesMean some, SharesMea
 // film is most of such a kernel.
 void shares_face_film(vec3 wo, vec4 albedo, vec4 albedo_mean, inout Surface s) {
     float of_wo = shares_roughness(s, wo), of_all = s.is_delta ? 0.0 : s.roughness;
-    SharesMean once, own, own_met, outside, outside_met, inside, fresnel;
+    // With values from the beginning: else the loop might leave those of the surface before, and compilers for GPUs keep them
+    // in registers until then.
+    SharesMean once = SharesMean(vec3(0.0), 0.0);
+    SharesMean own = once, own_met = once, outside = once, outside_met = once, inside = once, fresnel = once;
     vec3 ripples = vec3(0.0);
     for (int k = 0; k < 7 + SHARES_RIPPLES / 4; k++) {
         bool behind = k == 5 || (s.inside && (k == 1 || k == 2)), needed = HAS_TRANSMISSION != 0 || k == 0 || k == 3 || k > 5;
@@ -165,7 +168,7 @@ BASE_SHARE shares_kept_mean(Surface s) {
 BASE_SHARE shares_lost(Surface s, vec3 w, vec4 albedo, bool inside) {
 #if HAS_FILM
     if (s.film > 0.0) {
-        SharesMean some, all;
+        SharesMean some = SharesMean(vec3(0.0), 0.0), all = some;
         for (int k = 0; k < 2; k++) {
             float rule = k == 0 ? FACETS_OF_ONE : FACETS_OF_ONE + FACETS_MET;
             SharesMean mean = shares_mean(s, w, shares_eta(s, inside), rule, k == 0 || !inside);
