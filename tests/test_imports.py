@@ -32,6 +32,7 @@ MOST_METHODS, MOST_ATTRIBUTES = 30, 18  # of a class, its bases included
 DATA = {"BaseModel", "Model", "Record", "IntEnum", "Enum", "Protocol"}
 # Classes that are larger, each with the reason why it is one all the same.
 LARGE_CLASSES = {
+    "service.renderers.local.supervisor.Supervisor": "one renderer: its tasks are its state",
     "service.server.renders.render.Render": "one render: parts of it would only forward to each other",
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
 }

@@ -1,25 +1,54 @@
-"""Supervises one renderer: starts its process, and takes messages for the tasks that it renders."""
+"""Supervises one renderer: its tasks, whose messages go to their listeners, and a new process gets them when one is
+lost."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+import logging
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from service.ipc import channel
-from service.ipc.messages import EvaluateBsdf, Read, Restore, SavedPicture, ToRenderer, Update
+from service.ipc.leases import Lease, LeaseDone, LeaseFailed, LeaseRefuted
+from service.ipc.messages import (
+    Checkpoint,
+    Discarded,
+    Done,
+    EvaluateBsdf,
+    Evicted,
+    Frame,
+    Heard,
+    Image,
+    Loaded,
+    Progress,
+    Progressed,
+    Read,
+    Restore,
+    SavedPicture,
+    ToRenderer,
+    Update,
+    Usage,
+)
 from service.ipc.task_control import Drop
-from service.problems import Unavailable
-from service.renderers.local.keeper import CLOSING
-from service.renderers.local.process import Options, Process, Start
-from service.renderers.local.tasks import Events, Tasks
+from service.problems import MISTAKE, Unavailable
+from service.renderers.local.events import Alone, Events
+from service.renderers.local.keeper import CLOSING, Keeper
+from service.renderers.local.process import Cause, Options, Process, RendererProcess, Start
+from service.renderers.local.restarts import BY_OTHERS
 from service.renderers.protocol import Listener, Member, Place
 from service.renderers.replay_log import ReplayLog
-from service.renderers.statistics import Kind, Statistics
+from service.renderers.statistics import Held, Kind, Statistics
 from service.renderers.task import Task
-from service.system.executors import sending
+from service.system.background import reported
+from service.system.executors import sending, tending
+
+STRIKES = 3  # renderers that a task may bring down
+FORGIVEN_S = 5.0  # of life with that task, after which an earlier loss was not its fault
+
+log = logging.getLogger(__name__)
 
 
 class Supervisor:
@@ -38,10 +67,11 @@ class Supervisor:
         self.place = place or Place()
         options = replace(options or Options(), name=self.place.id)
         self._numbers = numbers or itertools.count(1)
-        self._tasks = Tasks(
-            self.place.id, start or partial(Process, options), options.patience_s, self.statistics, events
+        self.tasks: dict[int, Task] = {}  # those that were opened here, or taken over, by their numbers
+        self._events = events or Alone()
+        self._keeper = Keeper(
+            self.place.id, start or partial(Process, options), options.patience_s, self.statistics, self
         )
-        self._keeper = self._tasks.keeper
 
     def start(self) -> None:
         """Starts the renderer's process, if that was not done before; it is ready some tenths of a second later."""
@@ -53,7 +83,7 @@ class Supervisor:
 
     async def close(self) -> None:
         await self._keeper.stop()
-        self._tasks.fail_all(CLOSING)
+        self._fail_all(CLOSING)
         await self._keeper.end()
 
     @property
@@ -93,11 +123,6 @@ class Supervisor:
         return [Member(place, self._keeper.state, vendor, self.driver, self.process_id, self.statistics)]
 
     @property
-    def tasks(self) -> Mapping[int, Task]:
-        """Those that were opened here, or taken over, by their numbers."""
-        return self._tasks.by_number
-
-    @property
     def takes_tasks(self) -> bool:
         """Whether it takes tasks; they wait while its process starts or is replaced."""
         return self._keeper.takes_tasks
@@ -127,17 +152,19 @@ class Supervisor:
         if not self.takes_tasks:
             raise Unavailable(self.detail)
         number = next(self._numbers)
-        self._tasks.by_number[number] = Task(listener, kind, client or str(number), ReplayLog(number))
+        self.tasks[number] = Task(listener, kind, client or str(number), ReplayLog(number))
         return number
 
     def take_over(self, number: int, task: Task) -> None:
         """Go on with a task that was opened elsewhere, as with one's own after a loss of the process."""
-        self._tasks.add(number, task)
+        self.tasks[number] = task
+        if self._keeper.process is not None:
+            self._begin_again(number, task)
 
     def give_up(self, number: int) -> Task:
         """A task, for another supervisor to take over; this one's renderer forgets it."""
         task = self.tasks[number]
-        self._tasks.remove(number)
+        self._remove(number)
         self._keeper.send(Drop(number))
         return task
 
@@ -149,7 +176,7 @@ class Supervisor:
         return int(found is not None and found.active)
 
     def drop(self, task: int) -> None:
-        if self._tasks.forget(task) is not None:
+        if self._forget(task) is not None:
             self._keeper.send(Drop(task))
 
     def send(self, message: ToRenderer) -> None:
@@ -163,7 +190,7 @@ class Supervisor:
         if task.resident:
             self._keeper.send(message)
         elif isinstance(message, Read):
-            self._tasks.bring_back_soon(message.task, task)
+            self._bring_back_soon(message.task, task)
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
         """Like `send`, for a whole scene or a large edit: copying that to shared memory is not the event loop's work.
@@ -196,7 +223,7 @@ class Supervisor:
         task.record.restored(restore)
         task.resident = False
         channel.discard(encoded)
-        await self._tasks.bring_back(update.task, task)
+        await self._bring_back(update.task, task)
         return True
 
     def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
@@ -211,3 +238,161 @@ class Supervisor:
     def relay_encoded(self, encoded: channel.Encoded) -> None:
         """The same for what `channel.encode` gave, whose descriptors are the process's from now on."""
         self._keeper.send_encoded(encoded)
+
+    # What becomes of its tasks.
+
+    def _remove(self, number: int) -> Task | None:
+        """The task, which is not here from now on; None where it was not."""
+        self.statistics.gpu_s_of.pop(number, None)
+        return self.tasks.pop(number, None)
+
+    def _forget(self, number: int) -> Task | None:
+        """The task, of which nothing stays; None where it is not here."""
+        if (task := self._remove(number)) is not None:
+            task.record.close()
+            self._events.ended(number)
+        return task
+
+    def _fail_all(self, detail: str) -> None:
+        tasks = dict(self.tasks)
+        for number in tasks:
+            self._forget(number)
+        for task in tasks.values():
+            task.listener.lost(detail)
+
+    def _bring_back_soon(self, number: int, task: Task) -> None:
+        """Begin to bring back a picture; where that fails, what was under way begins again."""
+        self._keeper.do(
+            "return of a picture", self._bring_back(number, task), partial(self._lose_picture, number, task)
+        )
+
+    async def _bring_back(self, number: int, task: Task) -> None:
+        """Send the process a picture that it does not have, to go on with it or to read it."""
+        process, kept = self._keeper.process, task.record.kept
+        try:
+            encoded = await tending(lambda: channel.encode(kept() if callable(kept) else kept))
+        except Exception as error:
+            return self._lose_picture(number, task, error)
+        if task.resident or process is None or process is not self._keeper.process or number not in self.tasks:
+            return channel.discard(encoded)
+        task.resident = True
+        self._replay(number, task.record, encoded)
+
+    def changed(self) -> None:
+        self._events.changed()
+
+    def began(self) -> None:
+        for number, task in self.tasks.items():
+            self._begin_again(number, task)
+
+    def received(self, message: Heard) -> None:
+        if isinstance(message, Usage):
+            self._account(message)
+        elif isinstance(message, Lease | LeaseDone | LeaseFailed | LeaseRefuted):
+            self._events.leased(message)
+        elif (task := self.tasks.get(message.task)) is not None:
+            with reported("message of a renderer", lambda _: self._lose_task(message.task)):
+                self._hear(message, task)
+
+    def lost(self, process: RendererProcess, cause: Cause) -> None:
+        self._blame(process, cause)
+        self._events.lost()
+
+    def given_up(self) -> None:
+        self._fail_all(self._keeper.detail)
+
+    def _begin_again(self, number: int, task: Task) -> None:
+        """Send a process that does not know the task all that it needs."""
+        task.resident = task.record.kept is None
+        if task.resident:
+            self._replay(number, task.record)
+            task.listener.again()
+        elif task.record.saved is None or task.record.reads:
+            self._bring_back_soon(number, task)
+
+    def _replay(self, number: int, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
+        for message in record.again(kept):
+            if isinstance(message, tuple):
+                self._keeper.send_encoded(message)
+            else:
+                self._keeper.send(message)
+        self._events.replayed(number)
+
+    def _lose_picture(self, number: int, task: Task, error: Exception) -> None:
+        """The server's copy of a picture cannot be read: what was under way begins again."""
+        log.error("could not read a picture that was stored", {"task": number, "error": error})
+        if task.resident or number not in self.tasks:
+            return
+        if task.record.saved is not None:
+            if self._forget(number) is not None:
+                self._keeper.send(Drop(number))
+            return task.listener.lost("The stored picture cannot be read.")
+        task.record.forget()
+        task.resident = True
+        self._replay(number, task.record)
+        task.listener.again()
+
+    def _lose_task(self, number: int) -> None:
+        """An error of the server keeps a message from whom it is for, whom nothing reaches any more in order."""
+        if (task := self._forget(number)) is not None:
+            self._keeper.send(Drop(number))
+            task.listener.lost(MISTAKE)
+
+    def _hear(self, message: Heard, task: Task) -> None:
+        if isinstance(message, Evicted):
+            return self._evicted(message.task, task)
+        if isinstance(message, Done) and task.record.saved is not None:
+            return  # it was brought back, and had a turn before it learned that it has ended
+        if isinstance(message, Discarded):
+            task.record.forget()
+            return task.listener.again()
+        if isinstance(message, Loaded):
+            self._count(message)
+        elif isinstance(message, Checkpoint):
+            self.statistics.checkpoints += 1
+        elif isinstance(message, Frame | Progressed | Done) and time.monotonic() - task.struck_at > FORGIVEN_S:
+            task.strikes = 0
+        message = task.record.heard(message)
+        task.listener.heard(message)
+        self._events.heard(message)
+
+    def _evicted(self, number: int, task: Task) -> None:
+        task.resident = task.record.saved is None
+        if task.resident:  # it ended before it had a sample
+            for read in list(task.record.reads.values()):
+                task.listener.heard(task.record.heard(Image(number, read.serial, None, Progress())))
+        elif task.record.reads:
+            self._bring_back_soon(number, task)
+
+    def _account(self, usage: Usage) -> None:
+        statistics = self.statistics
+        statistics.samples += usage.samples
+        statistics.held = Held(usage.tasks, usage.bytes, usage.resting, usage.kernels)
+        statistics.kernels_evicted += usage.evicted
+        for number, seconds in usage.gpu_s.items():
+            task = self.tasks.get(number)
+            if task is not None:
+                statistics.gpu_s_of[number] += seconds
+            statistics.gpu_s[self._events.kind_of(number) if task is None else task.kind] += seconds
+
+    def _count(self, loaded: Loaded) -> None:
+        self.statistics.setup_s.add(loaded.setup_s)
+        if loaded.compile_ms:
+            self.statistics.compile_s.add(loaded.compile_ms / 1e3)
+        else:
+            self.statistics.kernels_found += 1
+
+    def _blame(self, process: RendererProcess, cause: Cause) -> None:
+        """Count the loss against the task that was worked on, unless the renderer was ended from outside."""
+        if cause in BY_OTHERS:
+            return
+        number = process.task
+        task = self.tasks.get(number)
+        if task is None:
+            return self._events.leased(LeaseFailed(number, 0, f"the renderer {cause}"))
+        task.strikes += 1
+        task.struck_at = time.monotonic()
+        log.warning("blamed a task for the loss of the renderer", {"task": number, "strikes": task.strikes})
+        if task.strikes >= STRIKES:
+            self._forget(number)
+            task.listener.lost(f"Rendering this scene brought the renderer down {STRIKES} times ({cause}).")

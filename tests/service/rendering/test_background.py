@@ -310,9 +310,9 @@ def test_a_picture_that_cannot_be_returned_begins_again(dies: Any, monkeypatch: 
         await supervisor.ready(10)
         record = supervisor.tasks[task].record
         record.checkpoint = None
-        monkeypatch.setattr(supervisor._tasks, "bring_back", broken)
+        monkeypatch.setattr(supervisor, "_bring_back", broken)
         supervisor.tasks[task].resident = False
-        supervisor._tasks.bring_back_soon(task, supervisor.tasks[task])
+        supervisor._bring_back_soon(task, supervisor.tasks[task])
         assert await ears.next(str) == "again" and supervisor.tasks[task].resident
 
     with_fake_processes(test, FakeProcesses())
