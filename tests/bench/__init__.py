@@ -32,6 +32,7 @@ standin         how work is cut for a stand-in for a GPU, in simulated time
 profile         where the time of a path goes on llvmpipe
 registers       registers and spills of kernels on an AMD GPU, without one
 radv            what compiles them, Mesa's RADV
+server          `sunbox serve` in a process of its own
 soak            mixed clients for a long time
 soak_clients    the clients of `soak`
 soak_page       a user of the editor in a browser, for `soak`

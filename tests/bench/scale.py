@@ -20,10 +20,10 @@ from typing import Any
 
 from gpu import Renderer
 from service.bench import machine
-from service.bench.server import Server
 from service.document import presets
 from service.worker.division.ledger import MOST_BYTES
 from tests.bench import scale_costs, scale_model
+from tests.bench.server import Server
 
 PLACES = (  # what runs, renderers, cores
     ("1 renderer of 1 core", 1, 1),

@@ -23,7 +23,7 @@ from pathlib import Path
 from shutil import which
 from typing import Any
 
-from service.bench.server import still_there
+from tests.bench.server import still_there
 from tests.bench.soak_server import SoakServer, add_renderers, renderer_settings
 
 DOCUMENTS = 5  # that differ: the picture of each is known beforehand

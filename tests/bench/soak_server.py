@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from service.bench.server import Server
+from tests.bench.server import Server
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WORKER = "service.worker"  # the module that a renderer runs

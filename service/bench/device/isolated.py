@@ -1,18 +1,27 @@
-"""A measurement in a process of its own: what it fails of, or where its driver hangs or dies, ends it alone."""
+"""A measurement in a process of its own: what it fails of, or where its driver hangs or dies, ends it alone. And one
+for two of them at once.
+"""
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Barrier
 from pathlib import Path
 from typing import Any
 
-from service.bench import machine
+from gpu import Renderer
+from service.bench import machine, timing
+from service.bench.device import stage
+from service.bench.device.stage import Options
 
 ENDING_S = 10.0  # for a process that gave its figures: drivers write their caches in the background
 SPAWN = get_context("spawn")  # a fork of a process that has spoken with a driver may hang
+PAIR_SCENE = "cornell-boxes"
+PATIENCE_S = 60.0  # for the other process to compile
 
 
 class Lost(Exception):
@@ -58,3 +67,18 @@ def _run(answer: Connection, cache: Path, function: Callable[..., Any], argument
         answer.send((True, function(*arguments)))
     except Exception as error:  # of whatever kind: the other measurements go on, and the report says what it was
         answer.send((False, f"{type(error).__name__}: {error}"))
+
+
+def rate_beside_others(options: Options, together: Barrier) -> float:
+    """Millions of paths per second of this process, from when all at the barrier are ready, for `turn_s`."""
+    size = options.sizes[0]
+    with Renderer(options.device) as renderer:
+        picture = renderer.picture(renderer.load(stage.arrays(PAIR_SCENE)), stage.settings(size))
+        samples = timing.samples_in(picture, options.turn_s / 4)
+        picture.reset()
+        together.wait(PATIENCE_S)
+        traced, began = 0, time.perf_counter()
+        while (seconds := time.perf_counter() - began) < options.turn_s or traced == 0:
+            timing.trace(picture, samples)
+            traced += samples
+        return traced * size[0] * size[1] / seconds / 1e6

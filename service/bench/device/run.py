@@ -12,8 +12,8 @@ from websockets.exceptions import WebSocketException
 
 from gpu.analysis.device_limits import device_limits
 from service.bench import machine
-from service.bench.device import blocks, caustics, dispatches, frames, kernels, pair, readout, scenes, trees
-from service.bench.device.isolated import SPAWN, Isolated, Lost
+from service.bench.device import frames, pictures, scenes
+from service.bench.device.isolated import PAIR_SCENE, SPAWN, Isolated, Lost, rate_beside_others
 from service.bench.device.report import Report
 from service.bench.device.stage import MESH, Options, Row
 
@@ -71,16 +71,16 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
             "device": device,
             "scenes": [row for name in options.scenes for row in _scene(run, name)],
             "frames": [row for size in options.sizes for row in _frames(run, size)],
-            "readouts": run.part("reading and encoding", readout.measure, options) or [],
-            "blocks": run.part("blocks of samples", blocks.measure, options) or [],
-            "slices": _named(run, "dispatches by length", dispatches.slices, dispatches.SCENES),
-            "sides": _named(run, "dispatches by size", dispatches.sides, dispatches.SCENES),
+            "readouts": run.part("reading and encoding", pictures.measure, options) or [],
+            "blocks": run.part("blocks of samples", pictures.blocks, options) or [],
+            "slices": _named(run, "dispatches by length", pictures.slices, pictures.DISPATCH_SCENES),
+            "sides": _named(run, "dispatches by size", pictures.sides, pictures.DISPATCH_SCENES),
             "pairs": [row for count in (1, 2) for row in _pair(run, count)],
-            "trees": _named(run, "orders of trees", trees.measure, trees.SCENES),
-            "kernels": [row for name in kernels.SCENES if name in options.scenes
-                        for row in _listed(run.part(f"full kernel of {name}", kernels.measure, name, options))],
-            "caustics": [row for name in caustics.SCENES if name in options.scenes
-                         for row in _listed(run.part(f"caustics of {name}", caustics.measure, name, options))],
+            "trees": _named(run, "orders of trees", scenes.trees, scenes.TREE_SCENES),
+            "kernels": [row for name in scenes.KERNEL_SCENES if name in options.scenes
+                        for row in _listed(run.part(f"full kernel of {name}", scenes.full_kernel, name, options))],
+            "caustics": [row for name in scenes.CAUSTIC_SCENES if name in options.scenes
+                         for row in _listed(run.part(f"caustics of {name}", scenes.caustics, name, options))],
         }  # fmt: skip
         _name_silence(run, device)
         about = machine.describe(device or {"renderer": None, "version": None})
@@ -110,7 +110,7 @@ def _named(run: _Run, what: str, function: Callable[..., list[Row]], names: tupl
 def _pair(run: _Run, count: int) -> list[Row]:
     def rates() -> list[float]:
         together = SPAWN.Barrier(count)
-        processes = [run.isolated(pair.measure, run.options, together) for _ in range(count)]
+        processes = [run.isolated(rate_beside_others, run.options, together) for _ in range(count)]
         try:
             return [process.result(run.patience_s) for process in processes]
         finally:
@@ -118,7 +118,7 @@ def _pair(run: _Run, count: int) -> list[Row]:
                 process.end()
 
     found = run.here(f"{count} process{'es' * (count > 1)} on the device", rates)
-    return [] if found is None else [{"scene": pair.SCENE, "processes": count, "mpaths_per_s": found}]
+    return [] if found is None else [{"scene": PAIR_SCENE, "processes": count, "mpaths_per_s": found}]
 
 
 def _listed(row: Row | None) -> list[Row]:

@@ -14,7 +14,7 @@ from gpu import SceneArrays
 from gpu.accel import bvh
 from gpu.accel.sah import Split
 from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_KIND_SHIFT, LEAF_MAX_COUNT, ShapeKind
-from service.bench.device.trees import in_one_order
+from service.bench.device.scenes import in_one_order
 from service.document import presets
 from tests.bench.seeds.stage import Document, Stage, sheet, shown
 

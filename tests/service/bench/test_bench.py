@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from service.bench import growth, latency, machine, scenes, speed, timing
+from service.bench import latency, machine, scenes, speed, timing
 from service.cli import bench
 from service.cli.program import main
 from service.document import parse_scene
@@ -52,14 +52,14 @@ def test_case_is_measured(gpu: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 @pytest.mark.bench
 def test_growth_is_that_of_one_form(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    coarse, fine = (trimesh.Trimesh(m.vertices, m.faces).volume for m in map(growth.ball, (4, 5)))
+    coarse, fine = (trimesh.Trimesh(m.vertices, m.faces).volume for m in map(speed.ball, (4, 5)))
     assert coarse == pytest.approx(fine, rel=0.01)
     monkeypatch.setattr(timing, "SIZE", 16)
     monkeypatch.setattr(timing, "RUN_S", 0.05)
-    rows = growth.measure(lambda line: None, range(1, 3))
+    rows = speed.growth(lambda line: None, range(1, 3))
     assert [row["triangles"] for row in rows] == [80, 320]
     assert all(row["ms_per_sample"] > 0 and row["build_mtri_per_s"] > 0 for row in rows)
-    assert len(growth.table(rows).splitlines()) == 3
+    assert len(speed._growth_table(rows).splitlines()) == 3
 
 
 @pytest.mark.bench

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from gpu import Renderer
 from gpu.analysis.slices import slices_of
-from service.bench.device import caustics, dispatches, frames, isolated, kernels, run, stage, table, trees
+from service.bench.device import frames, isolated, pictures, run, scenes, stage, table
 from service.bench.device.report import Report
 from service.cli.program import main
 
@@ -45,7 +45,7 @@ def test_every_part_gives_figures(
     assert scene.compile_cold_ms > scene.compile_warm_ms > 0 and [each.width for each in scene.sizes] == [32]
     assert [each.format for each in report.readouts[0].encoded] == ["jpeg", "webp", "png"]
     assert report.blocks[0].band_bytes == 32 * 24 * 48 and report.blocks[0].merge_ms > 0
-    assert [row.slice_ms / 1e3 for row in report.slices] == pytest.approx(dispatches.SLICES_S)
+    assert [row.slice_ms / 1e3 for row in report.slices] == pytest.approx(pictures.SLICES_S)
     assert [row.side for row in report.sides] == [64]
     assert [len(row.mpaths_per_s) for row in report.pairs] == [1, 2]
     assert len({row.tree for row in report.trees}) == 4 == len(report.trees)
@@ -132,9 +132,11 @@ def test_a_dispatch_is_as_long_as_it_is_asked_to_be(gpu: Renderer) -> None:
 
 @pytest.mark.bench
 def test_trees_differ_in_their_treelets_alone() -> None:
-    ways = trees.ways("generated-mesh")
+    ways = scenes.tree_ways("generated-mesh")
     for way, arrays in ways.items():
-        assert (len(arrays.nodes) > 8 * arrays.node_count) == (trees.TREELETS in way and trees.WHOLE not in way)
+        assert (len(arrays.nodes) > 8 * arrays.node_count) == (
+            scenes.WITH_TREELETS in way and scenes.WITHOUT_TREELETS not in way
+        )
     assert len({arrays.nodes.tobytes() for arrays in ways.values()}) == 4
 
 
@@ -143,16 +145,16 @@ def test_one_kernel_for_everything_is_compared(monkeypatch: pytest.MonkeyPatch, 
     class Cost:
         full_compile_ms, sample_s, full_sample_s = 900.0, 2.0, 3.0
 
-    monkeypatch.setattr(kernels, "kernel_cost", lambda renderer, arrays: Cost)
-    row = kernels.measure("cornell-boxes", TINY)
+    monkeypatch.setattr(scenes, "kernel_cost", lambda renderer, arrays: Cost)
+    row = scenes.full_kernel("cornell-boxes", TINY)
     assert row == {"scene": "cornell-boxes", "full_compile_ms": 900.0, "time_ratio": 1.5}
     assert "1.50" in table._kernels({"kernels": [row]})[-1]
 
 
 @pytest.mark.bench
 def test_caustics_of_both_ways_are_compared(gpu: Renderer) -> None:
-    row = caustics.measure("prism", replace(TINY, seconds=1e-3))
-    assert row["scene"] == "prism" and all(row[way]["ms_per_sample"] > 0 for way in caustics.WAYS)
+    row = scenes.caustics("prism", replace(TINY, seconds=1e-3))
+    assert row["scene"] == "prism" and all(row[way]["ms_per_sample"] > 0 for way in scenes.CAUSTIC_WAYS)
     assert table._caustics({"caustics": [row]})[-1].startswith("prism")
 
 
