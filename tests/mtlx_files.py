@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from service.document.saved_material import check_saved_material
+from service.document.document import check_saved_material
 from service.formats.scene_import import Imported
 from service.server.assets import AssetStore
 from tests.obj_files import zipped

@@ -1,27 +1,20 @@
 """The document as a person writes it: models with ranges, defaults, units and hints, and what is made from them.
 
-document        the document, and how it is parsed
+document        the document, and how it is parsed; a material as users save it
 camera, light, shape, environment, material, texture, transform   its parts
 medium          what fills a closed shape, or all space outside of bodies
-half_space      the albedo of single scattering that gives much of a medium its colour
 procedural      textures that are computed: noise and ramps
 settings        the settings of a render
-named           what a person can give a name
-base            the base of all models: strict, with hints for editors
-numbers         numbers with their ranges and units
-number_arrays   lists of numbers, checked in one go
+base            the base of all models: strict, with hints for editors; names of shapes and lights
+numbers         numbers with their ranges and units, and long lists of them
 color           colours: linear, sRGB, by temperature
 photometry      strengths in candela, lumen, lux and nit
 validation      what pydantic says, as errors with pointers
-error_location  a pointer into the document, from pydantic's
-text            JSON texts: parsed, weighed and bounded
-patch           JSON merge patches
+text            JSON texts: parsed, weighed and bounded; merge patches
 axes            what varies from one render of a batch to the next
 references      the assets that a document refers to
-saved_material  a material as users save it, with its textures
-brief           a material's model in few words
 look            the tone map and the colour space by which a picture is shown
-schema          the schema that editors are made from
+schema          the schema that editors are made from, and a model of it in few words
 quality         quality presets, and settings with every knob resolved
 presets         built-in scenes, materials and environments
 """
@@ -30,7 +23,7 @@ from __future__ import annotations
 
 from service.document.camera import AnyCamera, Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
 from service.document.color import Color
-from service.document.document import Scene, parse_scene
+from service.document.document import SavedMaterial, Scene, check_saved_material, parse_scene
 from service.document.environment import (
     ConstantEnvironment,
     CubemapEnvironment,
@@ -48,13 +41,11 @@ from service.document.material import (
     PrincipledMaterial,
 )
 from service.document.numbers import Vec3
-from service.document.patch import merge_patch
 from service.document.procedural import NoiseTexture, RampInput, RampStop, RampTexture
-from service.document.saved_material import SavedMaterial, check_saved_material
 from service.document.schema import schema
 from service.document.settings import Limits, Settings, parse_settings
 from service.document.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
-from service.document.text import load_json
+from service.document.text import load_json, merge_patch
 from service.document.texture import (
     CheckerTexture,
     ColorTexture,

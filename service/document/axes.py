@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from service.document.base import Model, refusal
-from service.document.patch import merge_patch
+from service.document.text import merge_patch
 from service.problems import FieldError, InvalidDocument
 
 MOST_TIMES = 500  # of an animation: each is posed before the batch is accepted

@@ -1,4 +1,6 @@
-"""What every model of the document shares: strictness, and how a validator reports an error."""
+"""What every model of the document shares: strictness, how a validator reports an error, and the names that people
+give to shapes and lights.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +8,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from types import NoneType
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPydanticSchema, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -16,7 +19,6 @@ Group = Literal["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface
 # What can be the width of a highlight: a perceptual roughness, the alpha of a distribution of facets, or the exponent
 # of a cosine, that of half vectors or that of mirrored directions.
 Width = Literal["roughness", "alpha", "exponent", "mirrored exponent"]
-
 REFUSAL = "refusal"  # the type, among pydantic's errors, of those that our validators raise
 MOST_MISTAKES = 100  # after which the search ends: a list of ten thousand wrong spheres only repeats itself
 
@@ -144,3 +146,30 @@ def _without_null(source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
 
 # On `T | None = None`: the field may be left out, but null is no value for it (in a merge patch null removes).
 OMITTABLE = GetPydanticSchema(_without_null)
+
+
+Name = Annotated[
+    Annotated[str, Field(min_length=1, max_length=500)] | None,
+    OMITTABLE,
+    hint("Name", "For people: nothing refers to it. Slashes make groups, as in a path: Truck/Wheels/Left."),
+]
+
+
+class Named(Model):
+    """Two that differ in nothing but `name` are equal: they look the same."""
+
+    def __eq__(self, other: Any) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        ours, theirs = self.__dict__, other.__dict__
+        return all(_equal(value, theirs[key]) for key, value in ours.items() if key != "name")
+
+    def __hash__(self) -> int:
+        return hash(tuple(value for key, value in self.__dict__.items() if key != "name"))
+
+
+def _equal(a: Any, b: Any) -> bool:
+    """Arrays by value: pydantic's own comparison has no answer for them."""
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b)
+    return type(a) is type(b) and bool(a == b)

@@ -7,9 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
-from service.document.base import hint, refusal
+from service.document.base import Name, Named, hint, refusal
 from service.document.color import Color
-from service.document.named import Name, Named
 from service.document.numbers import Direction, Point
 from service.document.photometry import SPHERE, Flux, strength, strength_schema
 

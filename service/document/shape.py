@@ -8,11 +8,19 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from service.document.base import OMITTABLE, hint, refusal
+from service.document.base import OMITTABLE, Name, Named, hint, refusal
 from service.document.medium import Medium
-from service.document.named import Name, Named
-from service.document.number_arrays import Colors, Coordinates, Directions, Points, Triangles, first_beyond
-from service.document.numbers import Direction, Point, PositiveLength
+from service.document.numbers import (
+    Colors,
+    Coordinates,
+    Direction,
+    Directions,
+    Point,
+    Points,
+    PositiveLength,
+    Triangles,
+    first_beyond,
+)
 from service.document.transform import AnyTransform
 
 # The sine between a quad's edges below which its float32 normal is noise: the spacing of float32 near 1.

@@ -1,4 +1,6 @@
-"""JSON text to Python values, by the letter of RFC 8259 where json.loads is lenient in ways that hide mistakes."""
+"""JSON text to Python values, by the letter of RFC 8259 where json.loads is lenient in ways that hide mistakes; and
+JSON merge patches.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,6 @@ from service.problems import MalformedJson
 
 DEEPEST = 64  # nested containers: a scene has six; deeper texts would exhaust the stack later
 LARGE = 64 * 1024  # characters whose parsing keeps every other thread waiting for 10 ms
-
 _one_large = threading.Lock()
 
 
@@ -127,3 +128,28 @@ def _check_surrogates(value: Any) -> None:
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         raise MalformedJson("a text has an unpaired surrogate (\\ud800 to \\udfff)") from None
+
+
+def merge_patch(target: Any, patch: Any) -> Any:
+    """`target` with `patch` merged in [RFC 7396]; neither is changed, and what did not change is shared.
+
+    Beyond the RFC: a patch that changes an object's `type` replaces the object whole, because the fields of the old
+    kind mean nothing to the new one.
+    """
+    if not isinstance(patch, dict):
+        return patch
+    merged = {} if not isinstance(target, dict) or _changes_type(target, patch) else dict(target)
+    for key, value in patch.items():
+        if value is None:
+            merged.pop(key, None)
+        else:
+            merged[key] = merge_patch(merged.get(key), value)
+    return merged
+
+
+def _changes_type(target: dict[str, Any], patch: dict[str, Any]) -> bool:
+    """Only texts and absence count: in a table of materials, "type" may be somebody's material."""
+    if "type" not in patch:
+        return False
+    old, new = target.get("type"), patch["type"]
+    return old != new and all(kind is None or isinstance(kind, str) for kind in (old, new))

@@ -16,7 +16,7 @@ from gpu import Renderer, RenderSettings
 from service.document import check_saved_material, parse_scene, presets
 from service.document.material.disney import DisneyMaterial
 from service.document.material.surface import Surface
-from service.document.presets import latlong, physically_based
+from service.document.presets import environments, physically_based
 from service.document.presets.generated import ASSETS, asset, asset_id
 from service.pack import pack
 from service.problems import NotFound
@@ -261,7 +261,7 @@ def read_image(name: str, folder: Path) -> np.ndarray:
 @pytest.mark.parametrize("name", IMAGES)
 def test_images_are_whole_and_positive(name: str, tmp_path: Path) -> None:
     pixels = read_image(name, tmp_path)
-    assert pixels.shape == (latlong.HEIGHT, latlong.WIDTH, 3)
+    assert pixels.shape == (environments.HEIGHT, environments.WIDTH, 3)
     assert np.isfinite(pixels).all() and pixels.min() > 0
     seam = np.abs(pixels[:, 0] - pixels[:, -1]) / pixels.mean(axis=1)
     assert seam.max() < 0.1, "the left edge goes on where the right one ends"
@@ -270,16 +270,16 @@ def test_images_are_whole_and_positive(name: str, tmp_path: Path) -> None:
 def test_rows_columns_and_channels_are_where_they_belong(tmp_path: Path) -> None:
     pixels = read_image("sunset", tmp_path)
     row, column = np.unravel_index(pixels.sum(axis=2).argmax(), pixels.shape[:2])
-    assert latlong.directions()[row, column] @ latlong.toward(52, 7) > np.cos(np.radians(1.5))
-    assert row < latlong.HEIGHT / 2 < column, "above the horizon, on the right of -Z"
+    assert environments.directions()[row, column] @ environments.toward(52, 7) > np.cos(np.radians(1.5))
+    assert row < environments.HEIGHT / 2 < column, "above the horizon, on the right of -Z"
     red, green, blue = pixels[row, column]
     assert red > green > blue
 
 
 def test_the_sun_gives_four_times_the_light_of_the_sky(tmp_path: Path) -> None:
     pixels = read_image("clear-sky", tmp_path) @ [0.2126, 0.7152, 0.0722]
-    polar = (np.arange(latlong.HEIGHT)[:, None] + 0.5) / latlong.HEIGHT * np.pi
-    cosine = np.clip(latlong.directions()[:, :, 1], 0, 1)
+    polar = (np.arange(environments.HEIGHT)[:, None] + 0.5) / environments.HEIGHT * np.pi
+    cosine = np.clip(environments.directions()[:, :, 1], 0, 1)
     light = pixels * cosine * np.sin(polar)
     disk = pixels > 20
     assert 3.5 < light[disk].sum() / light[~disk].sum() < 4.5

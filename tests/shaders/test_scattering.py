@@ -10,7 +10,7 @@ import pytest
 
 from gpu import Renderer, layout
 from gpu.layout.bindings import Slot
-from service.document.half_space import h_function, single_scattering_albedo
+from service.document.medium import h_function, single_scattering_albedo
 from tests import stats
 from tests.extremes.scenes import ball, icosphere, quad
 from tests.marks import BY_ESTIMATOR

@@ -2,11 +2,7 @@
 
 surface         emission, opacity and a normal map, which every material may have
 conversion      a material turned into another model
-peaks           widths of the peaks of facets' distributions
-abbe            dispersion by the Abbe number
-conductor       the complex index of metals
-tangent         the direction along which a highlight is stretched
-parameters      parameters that several models share
+parameters      parameters that several models share: colours, dispersion, indices of metals, tangents
 diffuse         the Lambertian model
 disney          the "principled" BRDF of 2012
 principled      the production model, with glass, coat and sheen: `disney` and more
@@ -18,7 +14,7 @@ metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers
 phong           the first of these highlights
 measured        a real surface, by a file
-microfacet      the distributions, geometry and Fresnel terms of the literature
+microfacet      the distributions, geometry and Fresnel terms of the literature; widths of their peaks
 """
 
 from __future__ import annotations

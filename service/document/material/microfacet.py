@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from service.document.base import OMITTABLE, hint, refusal
-from service.document.material.conductor import ConductorIndex, Extinction
-from service.document.material.peaks import same_width
+from service.document.material.parameters import ConductorIndex, Extinction
 from service.document.material.surface import SolidSurface
-from service.document.numbers import (
-    Fraction,
-    RefractiveIndex,
-    rounded,
-)
+from service.document.numbers import Fraction, RefractiveIndex, rounded
 from service.document.texture import REFERENCE_TAG, VALUE_TAG, AnyReflectance, ScalarTexture, form_of
 
 Distribution = Literal["phong", "beckmann", "ggx", "gtr", "abc", "sgd", "gaussian"]
 Geometry = Literal["implicit", "neumann", "cook_torrance", "kelemen", "schlick_ggx", "smith", "smith_correlated"]
 Fresnel = Literal["none", "schlick", "cook_torrance", "dielectric", "conductor"]
 DiffuseModel = Literal["lambert", "oren_nayar", "disney", "eon"]
-
 Range = tuple[float, float]
 WIDTHS: Range = (0.001, 10.0)
 ALPHA_RANGES: dict[Distribution, Range] = {
@@ -36,11 +32,21 @@ ALPHA_RANGES: dict[Distribution, Range] = {
 ANY_GAMMA: Range = (0.0, 1000.0)  # where the distribution has none
 GAMMA_RANGES: dict[Distribution, Range] = {"gtr": (0.1, 10.0), "abc": ANY_GAMMA, "sgd": (0.0, 2.0)}
 SCHLICK_GGX = ("ggx", "beckmann", "gtr")  # the distributions whose alpha it takes
-
 AnyAlpha = Annotated[
     Annotated[Annotated[float, Field(ge=0, le=1e6)], Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)],
     Discriminator(form_of),
 ]
+# How fast D falls off at its peak, log D = log D(0) - slope theta^2, by alpha and gamma; alpha by slope and gamma.
+_PEAKS: dict[str, tuple[Callable[[float, float], float], Callable[[float, float], float]]] = {
+    "phong": (lambda n, g: n / 2, lambda s, g: 2 * s),
+    "beckmann": (lambda a, g: 1 / a**2 - 2, lambda s, g: (s + 2) ** -0.5),
+    "ggx": (lambda a, g: 2 / a**2 - 2, lambda s, g: (s / 2 + 1) ** -0.5),
+    "gtr": (lambda a, g: g / a**2 - g, lambda s, g: (s / g + 1) ** -0.5),
+    "abc": (lambda a, g: a * g / 2, lambda s, g: 2 * s / (g or 1)),
+    "sgd": (lambda a, g: 1 / a + g / a**2 - 2, lambda s, g: _sgd(s, g)),
+    "gaussian": (lambda a, g: 1 / a**2, lambda s, g: s**-0.5),
+}
+_FLATTEST = 1e-3  # a slope; below it, and above 0, all peaks are flat
 
 
 def _inside(value: float, bounds: Range) -> float:
@@ -211,3 +217,16 @@ class MicrofacetMaterial(SolidSurface):
     def alpha_range(self) -> Range:
         """What alpha may be; a texture's values are clamped to it."""
         return ALPHA_RANGES[self.distribution]
+
+
+def _sgd(slope: float, gamma: float) -> float:
+    if gamma == 0:
+        return 1 / (slope + 2)
+    return 2 / (math.sqrt(1 + 4 * gamma * (slope + 2)) - 1) * gamma
+
+
+def same_width(before: str, alpha: float, gamma: float, after: str, gamma_after: float) -> float:
+    """The alpha with which the peak of `after` is as wide as that of `before`, two distributions; it may be out of
+    range."""
+    slope = max(_PEAKS[before][0](alpha, gamma), _FLATTEST)
+    return _PEAKS[after][1](slope, gamma_after)

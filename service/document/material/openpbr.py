@@ -13,9 +13,8 @@ from pydantic import ConfigDict, Field
 from service.document.base import OMITTABLE, hint
 from service.document.material import openpbr_film as film
 from service.document.material import openpbr_words, subsurface
-from service.document.material.abbe import Abbe, dispersion
+from service.document.material.parameters import Abbe, Tangent, dispersion, turn_of
 from service.document.material.surface import AnySurface, EmissionSides, Height
-from service.document.material.tangent import Tangent, turn_of
 from service.document.numbers import BRIGHTEST, Fraction
 from service.document.texture import (
     AnyFactor,

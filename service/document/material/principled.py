@@ -9,9 +9,8 @@ from pydantic import model_validator
 
 from service.document.base import OMITTABLE, hint, refusal
 from service.document.material import openpbr_words
-from service.document.material.abbe import Abbe, dispersion
-from service.document.material.conductor import ConductorIndex, Extinction
 from service.document.material.disney import DisneyMaterial
+from service.document.material.parameters import Abbe, ConductorIndex, Extinction, dispersion
 from service.document.material.subsurface import WalkRadius, factor_of
 from service.document.texture import (
     AnyDegrees,

@@ -8,17 +8,15 @@ the origin. `"builtin:NAME"` in it stands for an asset of `generated`.
 physically_based  materials of the Physically Based database
 generated      the assets that presets use
 mesh           grids, turned curves and rounded boxes, of which the things in scenes are made
-glassware, candle, bottle, watch, orange, car_panel, armchair, cloth, tree  the things in scenes
+tabletop       glasses, a bottle, a candle
+upholstery     an armchair, linen
+plants         an orange, a tree
+metalwork      a watch, the flank of a car
+subjects       what materials are shown on: a shader ball, a torus knot, a cyclorama
+environments   painted skies, and photographers' studios
 field          a thousand spheres
-disney_charts  spheres that show what each parameter of `disney` does
-lettering      words as meshes, for the labels of charts
-knot           a torus knot, as a mesh
-shader_ball    a shader ball, as a mesh
-cyclorama      a floor that becomes a wall, as a mesh
-skies          painted skies
-studio         photographers' studios
-latlong        directions and shapes of light in latitude-longitude pictures
-exr, ply       writers of the plainest OpenEXR and PLY files
+disney_charts  spheres that show what each parameter of `disney` does, and the words beside them
+encoders          writers of the plainest OpenEXR and PLY files
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from service.document.presets import ply
+from service.document.presets.encoders import encode_ply
 
 # Of normals that come from differences, whose last digits are another machine's: assets are named by their bytes.
 DIGITS = 4
@@ -49,7 +49,7 @@ class Mesh:
     def file(self) -> bytes:
         columns = np.concatenate(self._vertices).round(6).T + 0.0  # no -0
         names = ("x", "y", "z", "nx", "ny", "nz", "s", "t", "red", "green", "blue")[: len(columns)]
-        return ply.encode(dict(zip(names, columns, strict=True)), np.concatenate(self._faces))
+        return encode_ply(dict(zip(names, columns, strict=True)), np.concatenate(self._faces))
 
 
 def filleted(corners: Sequence[tuple[float, float, float]], steps: int = 4) -> Curve:

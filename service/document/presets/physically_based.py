@@ -12,7 +12,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from service.document.material.conductor import LEAST_INDEX
+from service.document.material.parameters import LEAST_CONDUCTOR
 
 KIND = "database"  # a part of the library of its own
 PREFIX = "physically-based-"
@@ -95,7 +95,7 @@ def _complex_index(entry: dict[str, Any], color: list[float]) -> dict[str, Any]:
     found = [((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k) for n, k in pairs]
     if max(abs(f - c) for f, c in zip(found, color, strict=True)) > DYED:
         return {}
-    turned = [_turned(max(n, LEAST_INDEX), k, c) for (n, k), c in zip(pairs, color, strict=True)]  # gold's n has a 0
+    turned = [_turned(max(n, LEAST_CONDUCTOR), k, c) for (n, k), c in zip(pairs, color, strict=True)]  # n may be 0
     return {name: [float(f"{x[i]:.5g}") for x in turned] for i, name in enumerate(("conductor_eta", "conductor_k"))}
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from service.document import Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera, Scene
+from service.document.base import Named
 from service.document.light import DirectionalLight, Light, SpotLight
-from service.document.named import Named
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
 from service.formats.types import Doubles

@@ -12,8 +12,7 @@ from pydantic import Field, TypeAdapter
 from service.document import Material, load_json
 from service.document.base import Model
 from service.document.material import MODELS
-from service.document.number_arrays import QuestionDirections
-from service.document.numbers import Cosine
+from service.document.numbers import Cosine, QuestionDirections
 from service.document.texture import references
 from service.document.validation import validated
 from service.ipc.messages import BsdfQuestion

@@ -11,8 +11,8 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import document
-from service.document import brief
 from service.document.material import MODELS
+from service.document.schema import brief, model_schema
 from service.problems import FieldError, InvalidDocument
 from service.server.http.compression import Constant
 from service.server.routes import answers, json_answers
@@ -95,7 +95,7 @@ def _schema() -> Constant:
 @lru_cache(2 * len(MODELS))
 def _model(model: str, is_brief: bool) -> Constant:
     """The schema of one material's model. Raises InvalidDocument."""
-    found = brief.model_schema(json.loads(_schema().plain)["scene"], model)
+    found = model_schema(json.loads(_schema().plain)["scene"], model)
     if found is None:
         raise InvalidDocument([FieldError("/model", f"is not one of {', '.join(sorted(MODELS))}")])
-    return Constant(brief.brief(found) if is_brief else found)
+    return Constant(brief(found) if is_brief else found)

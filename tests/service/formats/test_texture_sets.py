@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from service.cli.program import main
-from service.document.saved_material import check_saved_material
+from service.document.document import check_saved_material
 from service.formats.read.texture_sets.names import meaning
 from service.problems import AssetError, NotFound
 from service.server.assets import AssetStore

@@ -1,8 +1,4 @@
-"""A shader ball: what a look is judged on. Curved, flat and thin parts, a seam, and a wedge cut out.
-
-An upper shell without a wedge of it, whose cut is flat; a lower shell, and a seam between them; a thin dish that
-carries both. All edges are rounded: the light along an edge tells much of a material. The stand is a mesh of its own.
-"""
+"""What materials are shown on: a shader ball, a torus knot, and the cyclorama behind them."""
 
 from __future__ import annotations
 
@@ -11,8 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from service.document.presets.encoders import encode_ply
 from service.document.presets.mesh import Curve, Mesh
 
+# The shader ball: an upper shell without a wedge of it, whose cut is flat; a lower shell, and a seam between them; a
+# thin dish that carries both. All edges are rounded: the light along an edge tells much of a material. The stand is a
+# mesh of its own.
 CENTER = 0.98  # metres above the floor
 OUTER, INNER = 0.8, 0.67  # radii of the shells
 FOOT = 0.165  # height of the dish's middle, just above the stand
@@ -140,3 +140,75 @@ def _slab(mesh: Mesh) -> None:
     length = np.concatenate([[0.0], np.linalg.norm(np.diff(points[0], axis=0), axis=1).cumsum()])
     u, v = np.meshgrid(length, path)
     mesh.add(np.array(points), np.array(normals), np.stack([u, v], axis=-1))
+
+
+# A torus knot: a smooth tube, closed on itself.
+TURNS, TWISTS = 2, 3  # the trefoil
+KNOT_ALONG, KNOT_AROUND = 512, 24  # 24 576 triangles: no facet shows at 1080p
+RING, TUBE = 0.62, 0.21  # metres: of the torus, of the tube; the whole is about 2 m across and lies on y = 0
+DEPTH = 0.30
+
+
+def torus_knot() -> bytes:
+    """A binary PLY with vertex normals, counter-clockwise from outside."""
+    vertices, normals = _tube()
+    vertices[:, 1] -= vertices[:, 1].min()
+    names = ("x", "y", "z", "nx", "ny", "nz")
+    return encode_ply(dict(zip(names, np.hstack([vertices, normals]).T, strict=True)), _knot_faces())
+
+
+def _tube() -> tuple[np.ndarray, np.ndarray]:
+    t = np.arange(KNOT_ALONG) * (2 * math.pi / KNOT_ALONG)
+    middle = _curve(t)
+    # The frame of Frenet and Serret: a torus knot is nowhere straight, so it is smooth and closes without a twist.
+    step = 1e-4
+    tangent = _unit(_curve(t + step) - _curve(t - step))
+    bend = _curve(t + step) - 2 * middle + _curve(t - step)
+    inward = _unit(bend - tangent * (bend * tangent).sum(axis=1, keepdims=True))
+    across = np.cross(tangent, inward)
+    turn = np.arange(KNOT_AROUND) * (2 * math.pi / KNOT_AROUND)
+    normals = np.cos(turn)[:, None] * inward[:, None] + np.sin(turn)[:, None] * across[:, None]
+    return (middle[:, None] + TUBE * normals).reshape(-1, 3), normals.reshape(-1, 3)
+
+
+def _curve(t: np.ndarray) -> np.ndarray:
+    """Standing upright: the hole of the torus looks along z."""
+    radius = RING + DEPTH * np.cos(TWISTS * t)
+    return np.stack([radius * np.cos(TURNS * t), radius * np.sin(TURNS * t), DEPTH * np.sin(TWISTS * t)], axis=1)
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+
+
+def _knot_faces() -> np.ndarray:
+    i, j = np.meshgrid(np.arange(KNOT_ALONG), np.arange(KNOT_AROUND), indexing="ij")
+    a, b = i * KNOT_AROUND + j, (i + 1) % KNOT_ALONG * KNOT_AROUND + j
+    c, d = (i + 1) % KNOT_ALONG * KNOT_AROUND + (j + 1) % KNOT_AROUND, i * KNOT_AROUND + (j + 1) % KNOT_AROUND
+    return np.stack([a, c, b, a, d, c], axis=-1).reshape(-1, 3)
+
+
+# A cyclorama: a floor that rises to a wall without an edge, as photographers have it behind a product.
+WIDTH, FRONT, BACK, BEND, HEIGHT = 20.0, 10.0, 4.4, 2.4, 5.0  # metres; the bend is a quarter circle of that radius
+POOL = 3.4  # metres from the middle at which it reflects half as much, as if the lamp's light fell off
+
+
+def cyclorama() -> bytes:
+    """A binary PLY with normals and vertex colours: brightest in the middle, where its floor lies on y = 0."""
+    turn = np.linspace(0, math.pi / 2, 13)
+    floor = np.linspace(FRONT, BEND - BACK, 12, endpoint=False)
+    wall = np.linspace(BEND, HEIGHT, 5)[1:]
+    z = np.concatenate([floor, BEND - BACK - BEND * np.sin(turn), np.full(4, -BACK)])
+    y = np.concatenate([np.zeros(12), BEND - BEND * np.cos(turn), wall])
+    lean = np.concatenate([np.zeros(12), turn, np.full(4, math.pi / 2)])
+    x = np.linspace(-1, 1, 17) ** 3 * WIDTH / 2  # closer together where the picture looks
+    rows, columns = len(z), len(x)
+    points = np.stack(np.broadcast_arrays(x, y[:, None], z[:, None]), axis=-1).reshape(-1, 3)
+    normals = np.stack(np.broadcast_arrays(0.0 * x, np.cos(lean)[:, None], np.sin(lean)[:, None]), -1).reshape(-1, 3)
+    light = 1 / (1 + ((points - [0, 0.4, 0]) ** 2).sum(axis=1) / POOL**2)
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue")
+    columns_ = np.hstack([points, normals, light[:, None].repeat(3, axis=1)]).round(6) + 0.0
+    return encode_ply(dict(zip(names, columns_.T, strict=True)), faces)

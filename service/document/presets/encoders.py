@@ -1,5 +1,6 @@
-"""A writer of the plainest OpenEXR files. Its bytes depend on the pixels alone: assets are named by their hash, and a
-library would change that with its version."""
+"""Writers of the plainest OpenEXR and PLY files. Their bytes depend on the numbers alone: assets are named by their
+hash, and a library would change that with its version.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ HALF = 1  # the pixel type of 16-bit floats
 MAGIC, VERSION = 20000630, 2
 
 
-def encode(pixels: np.ndarray) -> bytes:
+def encode_exr(pixels: np.ndarray) -> bytes:
     """(height, width, 3) radiance, row 0 at the top -> a scan-line EXR file: half floats, no compression.
 
     [OpenEXR File Layout: magic and version, attributes, line offset table, a block per scan line with its channels in
@@ -44,3 +45,17 @@ def _attributes(width: int, height: int) -> list[bytes]:
 
 def _attribute(name: bytes, kind: bytes, value: bytes) -> bytes:
     return name + b"\0" + kind + b"\0" + struct.pack("<i", len(value)) + value
+
+
+def encode_ply(columns: dict[str, np.ndarray], faces: np.ndarray) -> bytes:
+    """A binary, little-endian PLY file: an attribute (n,) of the vertices for each name, and triangles (m, 3)."""
+    vertices = np.stack(list(columns.values()), axis=1).astype("<f4")
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(vertices)}\n"
+        + "".join(f"property float {name}\n" for name in columns)
+        + f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    records = np.zeros(len(faces), np.dtype([("count", "u1"), ("indices", "<i4", 3)]))
+    records["count"], records["indices"] = 3, faces
+    return header.encode() + vertices.tobytes() + records.tobytes()
