@@ -17,8 +17,8 @@ import pytest
 
 from gpu import ContextError, Renderer
 from gpu import context as contexts
-from service.system.logs import setup
-from service.system.logs.formatters import Console
+from service.system import logs
+from service.system.logs import Console
 from tests import kernel_count
 from tests.families import FamilyRenderer
 from tests.privileges import shed
@@ -247,7 +247,7 @@ def caplog(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
 @pytest.fixture
 def untouched_logging() -> Iterator[None]:
     """Logging as it was before the test."""
-    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in setup.ROOMS]
+    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in logs.ROOMS]
     before, levels, hooks = (
         root.handlers[:],
         [each.level for each in (root, *rooms)],

@@ -9,8 +9,7 @@ turntable      a turn of the camera, as an animation
 compare        whether two scenes or pictures differ beyond noise
 test           the scenes of a folder beside those of another
 comparing      what these two compare, and what they say of it
-own_server     a server for as long as a command needs one
-api            requests to a server
+api            requests to a server, or to one of its own for as long as a command needs it
 serve          the editor and the API
 bsdf           curves of a material's BSDF, into a table or a figure
 bsdf_curves    the curves of each kind

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from service.cli import BadInput, Failed, comparing, files
-from service.cli.own_server import server_or_own
+from service.cli.api import server_or_own
 
 
 def run(arguments: argparse.Namespace) -> int:

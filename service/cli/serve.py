@@ -20,10 +20,10 @@ log = logging.getLogger(__name__)
 def run(arguments: argparse.Namespace) -> int:
     config = configuration(host=arguments.host, port=arguments.port)
     from service.server import launch
-    from service.system.logs import setup
+    from service.system import logs
 
     secrets = [*config.api_key, *config.callback_secret]
-    setup.configure(config.log_format, config.log_level, queued=True, secrets=secrets)
+    logs.configure(config.log_format, config.log_level, queued=True, secrets=secrets)
     if (closed := _closed(config.data_dir)) is not None:
         log.warning(CLOSED.format(user=os.geteuid(), owner=closed.stat().st_uid, folder=closed))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.cli import BadInput, Failed, files
-from service.cli.own_server import server_or_own
+from service.cli.api import server_or_own
 
 if TYPE_CHECKING:
     from sunbox import Batch

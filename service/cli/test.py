@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from service.cli import BadInput, Failed, comparing, files
-from service.cli.api import lines_of
+from service.cli.api import lines_of, server_or_own
 from service.cli.comparing import Input
-from service.cli.own_server import server_or_own
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     named = [_packed(Path(path), arguments.asset_root, config) for path in arguments.scenes]
     from gpu import GpuError
-    from service.worker.warming import NotKept, wanted, warm
+    from service.worker.foreseen import NotKept, wanted, warm
 
     began = time.monotonic()
 

@@ -3,10 +3,8 @@
 types         meshes, images, measured reflection, scene files, limits, and the protocol by which packing loads assets
 errors        ParseError, which readers raise
 formats       the formats, and how a file's format is recognised
-limits        the bounds on assets, as the configuration sets them
 source        the bytes of an upload, in memory or in a file
-describe      the description of an asset: size, bounds, warnings
-cache         parsed assets in memory
+cache         parsed assets in memory, and what is said of one: size, bounds, warnings
 scene_import  a whole scene's file -> a document whose references are assets
 sandbox       the child process that parses
 read          readers of single formats, and importers of whole scenes

@@ -1,4 +1,6 @@
-"""A cache of parsed assets. A file that several threads load at once is parsed once."""
+"""A cache of parsed assets, and the description of one. A file that several threads load at once is parsed once."""
+
+from __future__ import annotations
 
 import threading
 from collections import OrderedDict
@@ -7,8 +9,18 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from service.formats.errors import MissingExtra, ParseError
+from service.formats.formats import KINDS
 from service.formats.sandbox.sandbox import Sandbox
-from service.formats.types import AssetLimits, Assets, ImageData, LutData, MeasuredData, MeshData, array_bytes
+from service.formats.types import (
+    AssetInfo,
+    AssetLimits,
+    Assets,
+    ImageData,
+    LutData,
+    MeasuredData,
+    MeshData,
+    array_bytes,
+)
 from service.problems import AssetError, NotProvided
 
 Parsed = MeshData | ImageData | LutData | MeasuredData
@@ -126,3 +138,17 @@ def refused(name: str, error: ParseError) -> AssetError | NotProvided:
     """What a caller is told of a file that is not read."""
     detail = f"{name}: {error}"
     return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
+
+
+def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
+    warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
+    if isinstance(parsed, ImageData):
+        height, width, channels = parsed.pixels.shape
+        return AssetInfo(id, KINDS[format], format, size, width, height, channels, warnings=warnings)
+    if isinstance(parsed, LutData | MeasuredData):
+        return AssetInfo(id, KINDS[format], format, size, warnings=warnings)
+    bounds = [corner.tolist() for corner in parsed.bounds]
+    vertices, triangles = len(parsed.vertices), len(parsed.faces)
+    return AssetInfo(
+        id, KINDS[format], format, size, vertices=vertices, triangles=triangles, bounds=bounds, warnings=warnings
+    )

@@ -9,22 +9,25 @@ lights              lights with their probabilities, and environments with the t
 textures            images -> texels, and the numbers of materials that read them
 worn                what is drawn of a scene, by what its shapes wear
 textured_emission   the mean emission of textured shapes that shine
-picture_bytes       the bytes of a picture
-parameter_edit      the edit that changes such parameters
-edits               parts that are reused after an edit, and the edit that leads to other arrays
+cache               parts that are reused after an edit, within a budget; the meshes that an editor has moved
+edits               the edit that leads to other arrays, and that of parameters alone
 """
 
-from service.pack.edits.cache import CacheBudget, PackCache
-from service.pack.edits.scene_edit import scene_edit
+from gpu.layout.pixel_layers import ACCUMULATOR_BYTES, FIRST_HIT_BYTES, VECTOR_BYTES
+from service.pack.cache import CacheBudget, PackCache
+from service.pack.edits import parameter_edit, scene_edit
 from service.pack.geometry.scene_bvh import warm_builder
 from service.pack.lights.environment_blur import CUBE_FACES
 from service.pack.lights.light_bounds import warm_light_tree
 from service.pack.microfacets import pack_microfacets
-from service.pack.parameter_edit import parameter_edit
 from service.pack.parameters import pack_camera, pack_materials
-from service.pack.picture_bytes import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES
 from service.pack.scene import Packed, lone_material, pack, pack_material
 from service.pack.worn import places, renamed, worn
+
+# Bytes of a pixel in a checkpoint: all samples, and a block of them, which the last picture may lack.
+SAVED_PIXEL_BYTES = 2 * ACCUMULATOR_BYTES
+# Bytes of a pixel in the renderer: the same, AOVs, and the denoised picture with a copy of it on its way.
+RENDERED_PIXEL_BYTES = SAVED_PIXEL_BYTES + FIRST_HIT_BYTES + 2 * VECTOR_BYTES
 
 __all__ = [
     "CUBE_FACES",

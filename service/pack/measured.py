@@ -15,7 +15,7 @@ from service.document import Scene
 from service.document.material import MeasuredMaterial
 from service.formats import Assets, MeasuredData
 from service.formats.read.measured.warp import Warp
-from service.pack.edits.cache import PackCache, lasting
+from service.pack.cache import PackCache, lasting
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
 
 MAX_TEXELS = 2**27  # of a texture of 16384 rows on the device

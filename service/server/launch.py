@@ -18,8 +18,8 @@ from service.renderers.pool.pool import Seat
 from service.server.http.listener import listen
 from service.server.storage.data_lock import FolderInUse, locked
 from service.system.confined import hide
+from service.system.cpu import set_steps
 from service.system.memory import MemoryBudget
-from service.system.priority import set_steps
 from service.system.shared_memory import return_freed
 
 DESCRIPTORS = 65_536

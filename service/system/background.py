@@ -1,4 +1,6 @@
-"""Work that nobody awaits. What kills it is logged and counted, and whoever it worked for is told."""
+"""Work that nobody awaits: what kills it is logged and counted, and whoever it worked for is told. And waiting for an
+event, for a time.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ import logging
 import threading
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 Died = Callable[[Exception], None]
@@ -92,3 +94,14 @@ def report_callbacks(loop: asyncio.AbstractEventLoop) -> None:
         )
 
     loop.set_exception_handler(died)
+
+
+async def within(event: asyncio.Event, seconds: float | None) -> None:
+    """Return when the event is set, or after that time.
+
+    By asyncio.timeout: until Python 3.12 asyncio.wait_for forgets to be cancelled where that comes together with what
+    it waits for, and whoever cancelled it waits for ever.
+    """
+    with suppress(TimeoutError):
+        async with asyncio.timeout(seconds):
+            await event.wait()

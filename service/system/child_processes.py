@@ -18,8 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from service.system.confined import Rights
-from service.system.cpu_time import answers
-from service.system.priority import working_niceness
+from service.system.cpu import answers, working_niceness
 
 ROOT = Path(__file__).parents[2]
 PAGE = os.sysconf("SC_PAGE_SIZE")

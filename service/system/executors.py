@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from service.system.priority import raise_thread_niceness, working_niceness
-from service.system.turns import CALLER
+from service.system.cpu import raise_thread_niceness, working_niceness
+from service.system.shares import CALLER
 
 # Steps of niceness above the event loop and the encoders, as far as SUNBOX_NICE goes.
 NICENESS = 5  # of threads that parse and pack scenes, for which a client waits

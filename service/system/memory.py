@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from service.problems import TooLarge, Unavailable
-from service.system.shares import Shares
-from service.system.turns import CALLER
+from service.system.shares import CALLER, Shares
 
 Category = Literal["bodies", "documents", "scenes", "pictures", "assets"]
 

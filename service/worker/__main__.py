@@ -14,11 +14,11 @@ from pathlib import Path
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
 from service.ipc.messages import Ready, Unable
+from service.system import logs
 from service.system.confined import hide
+from service.system.cpu import raise_process_niceness
 from service.system.garbage import loaded
 from service.system.lifeline import end_with
-from service.system.logs import setup
-from service.system.priority import raise_process_niceness
 from service.system.shared_memory import return_freed
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
@@ -50,8 +50,8 @@ def main() -> int:
         return 0
     _offer_itself()
     hide()  # not before: its /proc folder is root's from then on
-    setup.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
-    setup.always(renderer=arguments.name)
+    logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
+    logs.always(renderer=arguments.name)
     return_freed(FREED)  # a scene's arrays and, of a software renderer, its textures
     try:
         code = _serve(socket.socket(fileno=arguments.descriptor), arguments)

@@ -12,7 +12,7 @@ from service.worker.context import WorkerContext
 from service.worker.device.checkpoints import Checkpointer
 from service.worker.device.residency import Residency
 from service.worker.payloads import Result, sent_picture
-from service.worker.progress.progress import ProgressTracker
+from service.worker.progress import ProgressTracker
 from service.worker.view.frames import FrameSource
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from service.worker.device.resolution_ladder import FULL_S
 from service.worker.division.home import Home
 from service.worker.ending import Ending
 from service.worker.payloads import saved_bands, saved_picture
-from service.worker.progress.progress import ProgressTracker
+from service.worker.progress import ProgressTracker
 from service.worker.updates import Updates
 from service.worker.view.denoise_policy import DenoisePolicy
 from service.worker.view.frames import SLICE_S, FrameSource
-from service.worker.view.under_hand import UnderHand
+from service.worker.view.prior import UnderHand
 
 WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 

@@ -11,10 +11,9 @@ from service.worker.context import WorkerContext
 from service.worker.device.loaded_scene import EditedScene, KernelRequest, edited_scene, kernel_request
 from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
-from service.worker.progress.progress import ProgressTracker
+from service.worker.progress import ProgressTracker
 from service.worker.view.fallback_preview import FallbackPreview
-from service.worker.view.first_look import is_large
-from service.worker.view.unoptimised_look import UnoptimisedLook
+from service.worker.view.first_look import UnoptimisedLook, is_large
 
 if TYPE_CHECKING:
     from gpu import KernelKey

@@ -13,7 +13,7 @@ from gpu.layout import Instance, Node
 from gpu.precompile import kernel_keys
 from service.document import parse_scene
 from service.pack import PackCache, pack, scene_edit
-from service.pack.edits import moved_meshes
+from service.pack import cache as pack_cache
 from service.pack.geometry import instances
 from tests.gpu.instanced import IMAGES, two
 
@@ -95,7 +95,7 @@ def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
 def test_a_large_mesh_that_a_stream_moves_becomes_an_instance(monkeypatch: pytest.MonkeyPatch) -> None:
     """From the first move on, with all others that are large; not before, and not where nothing is kept."""
     monkeypatch.setattr(instances, "WORTH", 10**9)
-    monkeypatch.setattr(moved_meshes, "HEAVY", 1280)
+    monkeypatch.setattr(pack_cache, "HEAVY", 1280)
     cache, first = PackCache(), scene()
     assert not len(arrays_of(first, cache).instances)
     assert not len(arrays_of(scene(ball=1), cache).instances)
@@ -119,7 +119,7 @@ def test_a_small_mesh_that_moves_stays_among_the_others(monkeypatch: pytest.Monk
 
 def test_the_kernel_that_a_move_will_need_is_foreseen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instances, "WORTH", 10**9)
-    for module in (moved_meshes, kernel_keys):
+    for module in (pack_cache, kernel_keys):
         monkeypatch.setattr(module, "HEAVY", 1280)
     cache, settings = PackCache(), RenderSettings(48, 32)
     still, elsewhere = arrays_of(scene(), cache), arrays_of(scene(place=2.0), cache)

@@ -18,7 +18,7 @@ from service.server.callbacks import posting
 from service.server.callbacks.queue import AT_ONCE, EACH, OF_ONE_HOST, PAUSES, Callbacks
 from service.server.storage.callback_rows import KEPT, Callback, CallbackRows, insert
 from service.server.storage.database import Database
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 from sunbox import Client
 from tests.calls import is_problem, metrics
 from tests.service.receiving import Heard, Receiver

@@ -26,7 +26,7 @@ from service.config import load_config
 from service.formats import images
 from service.formats.images import read_metadata
 from service.ipc.messages import Progress
-from service.worker.progress import stop_rules
+from service.worker import progress as worker_progress
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -210,7 +210,7 @@ def test_time_limit_is_kept_and_ends_between_samples(
 
     clock = SimpleNamespace(monotonic=lambda: now_s, perf_counter=lambda: now_s)
     monkeypatch.setattr(passes.Passes, "_trace", traced)
-    for module in (passes, stop_rules):
+    for module in (passes, worker_progress):
         monkeypatch.setattr(module, "time", clock)
 
     def rendered(name: str, limit: str, pixels: int = 64) -> tuple[dict[str, Any], bytes]:
@@ -245,7 +245,7 @@ def test_target_noise_ends_a_render_at_the_same_samples_however_fast_it_is(
     for turn_s, slice_s, pause in ((0.0, 1e-5, 0), (1.0, 0.1, 1000)):
         monkeypatch.setattr("service.worker.task_picture.SLICE_S", turn_s)
         monkeypatch.setattr("gpu.picture.tiles.SLICE_S", slice_s)
-        monkeypatch.setattr("service.worker.progress.noise.PAUSE", pause)
+        monkeypatch.setattr("service.worker.progress.NOISE_PAUSE", pause)
         out, stats = tmp_path / f"{pause}.npy", tmp_path / f"{pause}.json"
         more = {"width": 64, "height": 64, "target_noise": 0.012, "sampler": "independent"}
         size = [part for name, value in more.items() for part in ("--set", f"{name}={value}")]

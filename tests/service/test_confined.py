@@ -24,9 +24,8 @@ from service.formats.types import AssetLimits
 from service.server.app import create_app
 from service.server.state import AppState
 from service.system.child_processes import ROOT, Children, inherited_environment
-from service.system.confined import Rights, rights, seccomp
-from service.system.confined.landlock import RIGHTS
-from service.system.confined.system_calls import AUDIT_ARCH, READING, system_calls
+from service.system.confined import Rights, kernel, rights
+from service.system.confined.kernel import AUDIT_ARCH, READING, RIGHTS, system_calls
 from tests import privileges
 from tests.serving import KEYS, SCENE, SMALL, Server, families
 
@@ -35,12 +34,12 @@ PYTHONS = {"as the tests": privileges._own, "without capabilities": None}
 TRIES = """
 import ctypes, fcntl, json, os, resource, signal, socket, struct, subprocess, sys
 from dataclasses import asdict
-from service.system.confined import confine, landlock, renounce, seccomp
+from service.system.confined import confine, renounce, rights as layers
 folder, victim, layer = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 if layer == "landlock":
-    seccomp.restrict = lambda calls: False
+    layers.filter_system_calls = lambda calls: False
 if layer == "seccomp":
-    landlock.restrict = lambda calls, paths: 0
+    layers.allow_reading_only = lambda calls, paths: 0
 libc = ctypes.CDLL(None, use_errno=True)
 ours, theirs = socket.socketpair()
 own = os.getpid()
@@ -304,12 +303,12 @@ def test_the_filter_is_sound(machine: str) -> None:
     """Of both processors: every jump lands within the program, and its last word is no."""
     calls = system_calls(machine)
     assert calls is not None
-    program = seccomp.program(calls, 1)
+    program = kernel.program(calls, 1)
     assert len(program) < 4096  # BPF_MAXINSNS
     for at, (code, true, false, _) in enumerate(program[:-1]):
         assert at + 1 + max(true, false) < len(program) and max(true, false) < 256
-        assert code == seccomp.EQUAL or true == false == 0
-    assert program[-1][0] == seccomp.RETURN and program[-1][3] & seccomp.REFUSE
+        assert code == kernel.EQUAL or true == false == 0
+    assert program[-1][0] == kernel.RETURN and program[-1][3] & kernel.REFUSE
 
 
 def test_another_processor_has_no_filter() -> None:

@@ -13,8 +13,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from service.formats.images import animation
-from service.formats.images.animation import Frames, NoEncoder
-from service.formats.images.animator import Animator
+from service.formats.images.animation import Animator, Frames, NoEncoder
 from service.formats.images.contact_sheet import EMPTY, PAPER, ContactSheet
 
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200), (200, 200, 30), (30, 200, 200), (200, 30, 200)]
@@ -140,8 +139,8 @@ def test_an_animation_ends_when_nobody_waits_for_it(tmp_path: Path) -> None:
 
 def test_an_animation_has_a_bound_of_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     size = frames_of(tmp_path, [picture(k, (1024, 1024)) for k in range(4)]).size
-    monkeypatch.setattr("service.formats.images.animator.SLACK", 0)
-    monkeypatch.setattr("service.formats.images.animator.most_memory", lambda size, pictures: 0)
+    monkeypatch.setattr("service.formats.images.animation.SLACK", 0)
+    monkeypatch.setattr("service.formats.images.animation.most_memory", lambda size, pictures: 0)
     animator = Animator(tmp_path / "spool", size, 4, "webp", 20)
     with (tmp_path / "a").open("wb") as file, pytest.raises(OSError, match="could not be written"):
         animator.write(file)

@@ -14,8 +14,8 @@ from types import SimpleNamespace
 import pytest
 
 from service.renderers.local.process import Options, Process
-from service.system import cpu_time
-from service.system.cpu_time import LEAST, RunnableTime, elapsed_s, ran
+from service.system import cpu
+from service.system.cpu import LEAST, RunnableTime, elapsed_s, ran
 
 SECOND = 10**9
 
@@ -66,7 +66,7 @@ def test_it_is_what_the_system_counts(spinning: subprocess.Popen[bytes]) -> None
 def test_a_starved_renderer_is_not_said_to_hang(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [1000.0]
     # Its own clock alone: with that of the loop `end` would wait for ever for a process that has not died yet.
-    monkeypatch.setattr(cpu_time, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(cpu, "time", SimpleNamespace(monotonic=lambda: clock[0]))
 
     async def test() -> None:
         process = Process(Options(patience_s=10.0), lambda message: None, lambda: None)
@@ -76,7 +76,7 @@ def test_a_starved_renderer_is_not_said_to_hang(monkeypatch: pytest.MonkeyPatch)
             os.waitpid(process.id, os.WUNTRACED)
             process.link.send("something")
             counted = {process.id: (0, 0)}
-            monkeypatch.setattr(cpu_time, "ran", lambda pid: dict(counted))
+            monkeypatch.setattr(cpu, "ran", lambda pid: dict(counted))
             process.watch()
             clock[0], counted[process.id] = 1100.0, (5 * SECOND, 95 * SECOND)
             process.watch()

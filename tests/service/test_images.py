@@ -17,7 +17,7 @@ from service import displays, views
 from service.colorimetry import decode_srgb as srgb_to_linear
 from service.colorimetry import encode_srgb
 from service.formats import images
-from service.formats.images import icc
+from service.formats.images import encoders
 from service.formats.images.metadata import exr_attributes
 from tests.asset_files import png, read_exr, read_hdr, read_png
 
@@ -212,8 +212,8 @@ def test_profiles_lead_to_the_right_colour(format: views.FileFormat, encoding: d
     """Little CMS finds the sRGB values that the matrices of the standards give."""
     shown = np.array([0.8, 0.5, 0.4])
     curve = srgb_to_linear(shown) if encoding.transfer == "srgb" else shown ** float(encoding.transfer)
-    to_srgb = np.linalg.inv(icc.xyz_matrix(icc.PRIMARIES["rec709"])) @ icc.xyz_matrix(
-        icc.PRIMARIES[encoding.primaries]
+    to_srgb = np.linalg.inv(encoders.xyz_matrix(encoders.PRIMARIES["rec709"])) @ encoders.xyz_matrix(
+        encoders.PRIMARIES[encoding.primaries]
     )
     expected = encode_srgb(to_srgb @ curve) * 255
     pixels = np.broadcast_to(np.float32([*shown, 1]), (16, 16, 4))

@@ -14,9 +14,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.system.logs import output as log_output
-from service.system.logs import setup
-from service.system.logs.formatters import Console, Json, bound
+from service.system import logs
+from service.system.logs import Console, Json, bound
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, Client, Server, wait_until
 
@@ -38,15 +37,15 @@ def failing(secret: str = "a-local-secret") -> None:
 
 @pytest.mark.parametrize("form", ["console", "json"])
 def test_tracebacks_are_plain_and_rare(form: str, untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
-    setup.configure(form, "info")
+    logs.configure(form, "info")
     for _ in range(5):
         failing()
     (output,) = logging.getLogger().handlers
-    assert isinstance(output, log_output.Output)
+    assert isinstance(output, logs.Output)
     told = capfd.readouterr().err
     assert told.count("ValueError: what went wrong") == 1 and "a-local-secret" not in told
     assert "│" not in told, "Rich draws boxes, which takes seconds"
-    output.tell_repeated(time.monotonic() + log_output.REPEAT_S)
+    output.tell_repeated(time.monotonic() + logs.REPEAT_S)
     (line,) = capfd.readouterr().err.splitlines()
     assert "and 4 more like it" in line and "ValueError" in line and "test_logs.py:" in line
     failing()
@@ -58,18 +57,18 @@ def test_who_logs_does_not_wait(untouched_logging: None, monkeypatch: pytest.Mon
     written: list[tuple[str, str]] = []
     let_go = threading.Event()
 
-    def write(self: log_output.Output, record: logging.LogRecord) -> None:
+    def write(self: logs.Output, record: logging.LogRecord) -> None:
         let_go.wait(PATIENCE_S)
         written.append((threading.current_thread().name, self.format(record)))
 
     monkeypatch.setattr(logging.StreamHandler, "emit", write)
-    monkeypatch.setattr(log_output.atexit, "register", lambda stop: None)
-    setup.configure("json", "info", queued=True)
+    monkeypatch.setattr(logs.atexit, "register", lambda stop: None)
+    logs.configure("json", "info", queued=True)
     with bound(request="mine"):
         log.info("first", {"count": 1})
         failing()
     (queued,) = logging.getLogger().handlers
-    assert isinstance(queued, log_output.Queued) and not written
+    assert isinstance(queued, logs.Queued) and not written
     let_go.set()
     queued.records.put(None)
     until = time.monotonic() + PATIENCE_S
@@ -83,8 +82,8 @@ def test_who_logs_does_not_wait(untouched_logging: None, monkeypatch: pytest.Mon
 
 
 def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_output, "MOST_QUEUED", 2)
-    queued = log_output.Queued()
+    monkeypatch.setattr(logs, "MOST_QUEUED", 2)
+    queued = logs.Queued()
     for _ in range(5):
         queued.handle(logging.makeLogRecord({"msg": "x"}))
     assert queued.records.qsize() == 2 and queued.dropped == 3
@@ -104,7 +103,7 @@ def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_secret_is_logged(
     text: str, form: str, untouched_logging: None, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    setup.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
+    logs.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
     log.info("heard", {"text": text})
     log.info(text)
     told = capfd.readouterr().err
@@ -113,7 +112,7 @@ def test_no_secret_is_logged(
 
 def test_libraries_speak_of_what_matters(untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
     """uvicorn tells each WebSocket's address at INFO, query included; numba's DEBUG is thousands of lines."""
-    setup.configure("json", "debug")
+    logs.configure("json", "debug")
     for name in ("uvicorn.error", "numba.core.ssa", "PIL.PngImagePlugin", "asyncio", "websockets"):
         logging.getLogger(name).info("something happened")
     assert not capfd.readouterr().err

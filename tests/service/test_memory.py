@@ -31,7 +31,7 @@ from service.server.streams import protocol
 from service.server.streams.edit_session import EditSession
 from service.system import memory
 from service.system.memory import Limit, MemoryBudget, machine_memory
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, SCENE, Client, Server, served, wait_until
 

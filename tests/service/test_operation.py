@@ -22,7 +22,7 @@ from service.config import GIB, MAX_PIXELS, MIB, Config
 from service.server import app, launch
 from service.server.routes.metrics import scrape
 from service.server.state import AppState
-from service.system.logs import setup
+from service.system import logs
 from tests.calls import metrics
 from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, client, wait_until
 
@@ -156,7 +156,7 @@ def test_the_readme_has_the_configuration() -> None:
 
 
 def test_logging_is_set_up_once(untouched_logging: None, capfd: pytest.CaptureFixture[str]) -> None:
-    setup.configure("json", "warning")
+    logs.configure("json", "warning")
     logging.getLogger("a.b").warning("what happened", {"count": 3})
     logging.getLogger("a.b").info("not told")
     told = json.loads(capfd.readouterr().err)

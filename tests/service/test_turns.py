@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from service.system.turns import CALLER, Turns
+from service.system.shares import CALLER, Turns
 
 PATIENCE_S = 30.0
 

@@ -11,9 +11,8 @@ from typing import cast
 
 import pytest
 
-from service.system import background
+from service.system import background, logs
 from service.system.background import report_callbacks
-from service.system.logs import setup
 
 SERVICE = Path(__file__).parents[2] / "service"
 TESTS = Path(__file__).parent / "rendering" / "test_background.py"
@@ -82,8 +81,8 @@ def test_callbacks_of_the_loop_and_threads_are_reported(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = background.deaths()
-    monkeypatch.setattr(threading, "excepthook", setup._thread_died)
-    monkeypatch.setattr(sys, "unraisablehook", setup._finalizer_died)
+    monkeypatch.setattr(threading, "excepthook", logs._thread_died)
+    monkeypatch.setattr(sys, "unraisablehook", logs._finalizer_died)
 
     class Leaves:
         def __del__(self) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.system.waiting import within
+from service.system.background import within
 
 ROOT = Path(__file__).parents[2]
 
@@ -49,4 +49,4 @@ def test_nothing_waits_in_the_way_that_forgets_to_be_cancelled() -> None:
         if isinstance(node, ast.Attribute) and node.attr == "wait_for"
         if isinstance(node.value, ast.Name) and node.value.id == "asyncio"
     ]
-    assert calls == [], "use asyncio.timeout, or service.system.waiting"
+    assert calls == [], "use asyncio.timeout, or service.system.background"

@@ -11,7 +11,7 @@ from gpu.precompile import kernel_keys
 from service.cli import program as cli
 from service.cli import warm
 from service.config import load_config
-from service.worker import warming
+from service.worker import foreseen as kernels_ahead
 from service.worker.helpers.compile_client import records
 from tests.supervisors import arrays_of
 
@@ -24,7 +24,7 @@ def _cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_kernels_are_compiled_once(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(warming, "wanted", lambda foreseen: FEW)
+    monkeypatch.setattr(kernels_ahead, "wanted", lambda foreseen: FEW)
     assert cli.main(["warm", "--jobs", "1"]) == 0
     said = capsys.readouterr()
     assert [line.partition(",")[0] for line in said.err.splitlines()] == [f"{n} of 2 kernels" for n in range(3)]
@@ -36,14 +36,14 @@ def test_kernels_are_compiled_once(monkeypatch: pytest.MonkeyPatch, capsys: pyte
 
 def test_without_a_cache_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "true")
-    monkeypatch.setattr(warming, "wanted", lambda foreseen: FEW)
+    monkeypatch.setattr(kernels_ahead, "wanted", lambda foreseen: FEW)
     assert cli.main(["warm", "--jobs", "1"]) == 1
     assert "its disk cache is off" in capsys.readouterr().err
 
 
 def test_it_wants_what_a_server_foresees_and_the_scenes_that_are_named() -> None:
     named = arrays_of("rich")
-    with_it, without = (warming.wanted(list(warm.foreseen(scenes, load_config()))) for scenes in ([named], []))
+    with_it, without = (kernels_ahead.wanted(list(warm.foreseen(scenes, load_config()))) for scenes in ([named], []))
     assert set(kernel_keys.common_keys()) | set(kernel_keys.bsdf_keys()) <= set(without) <= set(with_it)
     began = kernel_keys.kernel_key(named, RenderSettings(**warm.SETTINGS), kernel_keys.flags(named, True))
     assert began in with_it and began not in without and len(set(with_it)) == len(with_it)

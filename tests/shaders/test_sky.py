@@ -14,7 +14,7 @@ from gpu.layout.bindings import Slot
 from gpu.tables import alias_table, sky
 from service.document import parse_scene
 from service.pack import pack
-from service.pack.edits.cache import PackCache
+from service.pack.cache import PackCache
 from service.problems import InvalidDocument
 from tests import stats
 from tests.marks import BY_ESTIMATOR

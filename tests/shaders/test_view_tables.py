@@ -9,8 +9,8 @@ from gpu import Lut, Picture, Renderer
 from gpu.picture.display import srgb
 from service import displays
 from service.colorimetry import decode_srgb
-from service.formats.images import icc
-from service.worker.view import view_tables
+from service.formats.images import encoders
+from service.worker.view import frames
 from tests.rendering import document, picture
 
 SIDE = 96
@@ -59,8 +59,8 @@ def test_names_are_those_of_the_library() -> None:
 def test_views_are_the_librarys(
     canvas: Picture, colors: np.ndarray, view: tuple[str, str], mean: float, most: float, exposure: float
 ) -> None:
-    table = view_tables.view_table(*view)
-    exact = np.clip(view_tables.exact(colors[..., :3] * 2**exposure, *view), 0, 1)
+    table = frames.view_table(*view)
+    exact = np.clip(frames.exact(colors[..., :3] * 2**exposure, *view), 0, 1)
     floats = canvas.display(tone_map=table, exposure=exposure, dtype="f4", color=colors)
     error = np.abs(floats[..., :3] - exact).max(axis=-1) * 255
     assert error.mean() < mean and error.max() < most
@@ -68,14 +68,16 @@ def test_views_are_the_librarys(
 
 
 def test_greys_stay_grey_and_in_order(canvas: Picture, colors: np.ndarray) -> None:
-    shown = canvas.display(tone_map=view_tables.view_table(*ACES2), dtype="f4", color=colors)[0, :, :3]
+    shown = canvas.display(tone_map=frames.view_table(*ACES2), dtype="f4", color=colors)[0, :, :3]
     assert np.ptp(shown, axis=1).max() < 2e-3 and (np.diff(shown[:, 1]) > 0).all() and shown[0].max() < 1e-3
 
 
 @pytest.mark.parametrize("tone_map", ["linear", "reinhard", "agx"])
 def test_curves_in_the_primaries_of_p3(canvas: Picture, colors: np.ndarray, tone_map: str) -> None:
     """Curves run in those of the screen; what was fitted for Rec.709 runs there, and its result is converted."""
-    matrix = np.linalg.inv(icc.xyz_matrix(icc.PRIMARIES["p3"])) @ icc.xyz_matrix(icc.PRIMARIES["rec709"])
+    matrix = np.linalg.inv(encoders.xyz_matrix(encoders.PRIMARIES["p3"])) @ encoders.xyz_matrix(
+        encoders.PRIMARIES["rec709"]
+    )
     radiance = colors[..., :3].astype(float)
     if tone_map == "agx":
         narrow = canvas.display(tone_map=tone_map, dtype="f4", color=colors)[..., :3]
@@ -88,14 +90,14 @@ def test_curves_in_the_primaries_of_p3(canvas: Picture, colors: np.ndarray, tone
 
 
 def test_a_view_is_baked_once() -> None:
-    assert view_tables.view_table(*ACES2) is view_tables.view_table(*ACES2)
+    assert frames.view_table(*ACES2) is frames.view_table(*ACES2)
 
 
 @pytest.mark.parametrize("radiance", [0.0, 1e20, 3e38])
 def test_views_end_in_their_limits(canvas: Picture, colors: np.ndarray, radiance: float) -> None:
     lit = np.broadcast_to(np.float32([radiance, 0, radiance, 1]), colors.shape)
     for exposure in (-60.0, 60.0):
-        shown = canvas.display(tone_map=view_tables.view_table(*ACES2), exposure=exposure, dtype="f4", color=lit)
+        shown = canvas.display(tone_map=frames.view_table(*ACES2), exposure=exposure, dtype="f4", color=lit)
         assert np.isfinite(shown).all() and (shown >= 0).all() and (shown <= 1).all()
 
 
@@ -133,7 +135,7 @@ def test_a_cube_follows_a_view(canvas: Picture, colors: np.ndarray) -> None:
     axis = np.linspace(0, 1, 5, dtype=np.float32)
     blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
     turned = Lut("turned", np.stack([green, blue, red], axis=-1))
-    view = view_tables.view_table(*ACES2)
+    view = frames.view_table(*ACES2)
     shown = canvas.display(tone_map=view, dtype="f4", color=colors)
     through = canvas.display(tone_map=view, dtype="f4", color=colors, lut=turned)
     np.testing.assert_allclose(through[..., :3], shown[..., [1, 2, 0]], atol=1e-4)

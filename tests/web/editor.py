@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page
 
-from service.worker.view.under_hand import WORTH
+from service.worker.view.prior import WORTH
 
 GUESSED = WORTH[-1][0]  # samples of a picture until which the one before has a part in it
 MENUS = {"save": ("#scene-menu", "#page-save"), "view": ("#view", "#view-menu")}

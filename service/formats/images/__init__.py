@@ -1,14 +1,12 @@
 """Pixels -> PNG, JPEG, WebP, AVIF, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
 
-encoders        how each format is written
+encoders        how each format is written, with the colour space that it says
 metadata        the metadata of PNG and EXR files
-icc             what the numbers of a picture stand for, as files say it
 recipe          the scene and settings that a picture was made from, in that metadata
 cryptomatte     which things cover how much of each pixel, as EXR files say it
 contact_sheet   many pictures on one, each with its name
-animation       pictures one after the other
+animation       pictures one after the other, written by a process of their own
 animation_main  the process that writes them
-animator        starts that process, and ends it when nobody waits for it
 """
 
 from __future__ import annotations

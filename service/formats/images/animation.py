@@ -13,12 +13,16 @@ import io
 import shutil
 import struct
 import subprocess
+import sys
+import threading
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, get_args
 
 from PIL import Image
+
+from service.system.child_processes import ROOT, inherited_environment
 
 AnimationFormat = Literal["apng", "webp", "gif", "avif", "mp4"]
 FORMATS: tuple[AnimationFormat, ...] = get_args(AnimationFormat)
@@ -196,3 +200,56 @@ def _write_mp4(path: Path, frames: Frames, fps: float) -> None:
             raise OSError(
                 f"ffmpeg could not write the animation: {said.splitlines()[-1] if said else 'no reason given'}"
             )
+
+
+MIB = 1 << 20
+# What the process takes, in bytes: itself; for each pixel of one picture, which AVIF's encoder has several times; and
+# for each pixel of all pictures, which the encoders of WebP and AVIF have compressed, twice at the end.
+PROCESS_BYTES, PICTURE_PIXEL_BYTES, PIXEL_BYTES = 40 * MIB, 48, 1
+# Its bound is so much higher: address space that is no memory, as the stacks of an encoder's threads.
+SLACK = 1024 * MIB
+
+
+def most_memory(size: tuple[int, int], pictures: int) -> int:
+    """About the bytes of memory that writing an animation takes."""
+    pixels = size[0] * size[1]
+    return PROCESS_BYTES + pixels * (PICTURE_PIXEL_BYTES + pictures * PIXEL_BYTES)
+
+
+class Animator:
+    """Writes one animation in a process of its own, which may take minutes and is ended when nobody waits for it:
+    from pictures that lie one after the other in the file `spool`, as `Frames` reads them."""
+
+    def __init__(
+        self, spool: Path, size: tuple[int, int], pictures: int, format: AnimationFormat, fps: float
+    ) -> None:
+        self._spool, self._size, self._format, self._fps = spool, size, format, fps
+        self._memory = SLACK + most_memory(size, pictures)
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stopped = False
+
+    def write(self, file: BinaryIO) -> None:
+        """Waits for the process. Raises OSError where that failed, or was stopped."""
+        into = file.fileno()
+        numbers = (*self._size, self._format, self._fps, into, self._memory)
+        with self._lock:
+            if self._stopped:
+                raise OSError("nobody waits for this animation any more")
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "service.formats.images.animation_main", str(self._spool), *map(str, numbers)],
+                cwd=ROOT, env=inherited_environment(), pass_fds=[into],
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            )  # fmt: skip
+        with self._process as process:
+            assert process.stderr is not None
+            said = process.stderr.read().decode(errors="replace").strip()
+            if process.wait():
+                raise OSError(f"the animation could not be written: {said.splitlines()[-1] if said else 'ended'}")
+
+    def stop(self) -> None:
+        """End it, if it is not done. For any thread."""
+        with self._lock:
+            self._stopped = True
+            if self._process is not None:
+                self._process.kill()

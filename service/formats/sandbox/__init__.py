@@ -2,8 +2,6 @@
 
 sandbox     the parent's side: starts the child, hands it a file, takes its arrays
 child       the child's side: `python -m service.formats.sandbox.child`
+readers     a mesh file -> arrays that the rest may trust; USD, a zip or MaterialX -> a scene
 wire        messages between both, and arrays in shared memory
-parse_mesh  a mesh file -> arrays that the rest may trust
-parse_usd   a USD file -> a scene or its triangles, where the extra is installed
-parse_zip   a zip, or MaterialX -> a scene, or materials with their textures
 """

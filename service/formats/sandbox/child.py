@@ -92,9 +92,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     from service.formats.read.measured.adaptive import parse_adaptive
     from service.formats.read.measured.merl import parse_merl
     from service.formats.read.rendered import parse_rendered
-    from service.formats.sandbox.parse_mesh import parse_mesh
-    from service.formats.sandbox.parse_usd import read_usd_scene
-    from service.formats.sandbox.parse_zip import parse_mtlx, parse_zip
+    from service.formats.sandbox.readers import parse_mesh, parse_mtlx, parse_zip, read_usd_scene
 
     size = os.fstat(source).st_size
     if not size:

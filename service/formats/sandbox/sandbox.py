@@ -30,7 +30,7 @@ from service.formats.types import (
 )
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
-from service.system.turns import Turns
+from service.system.shares import Turns
 
 log = logging.getLogger(__name__)
 

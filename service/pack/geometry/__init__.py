@@ -1,24 +1,19 @@
 """Shapes -> records, triangles and the tree over them, relative to an origin near the camera.
 
-assemble          the geometry of a whole scene
-geometry          the dataclass of the result
-reuse             reuse of the parts of earlier geometries
+assemble          the geometry of a whole scene, with parts of earlier ones
+geometry          the dataclass of the result, and the finished arrays of all triangles
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
 meshes            meshes in world space, and their triangles as records
-displacement      meshes that a height moves
-subdivision       triangles cut until their edges are short enough
+displacement      meshes that a height moves, cut until their edges are short enough
 vertex_normals    smooth normals at the corners, and their codes
 corner_angles     the loop over faces that finds these, as machine code
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
 instances         the choice of shared meshes, and the records of the shapes that show them
-bodies            what fills the shapes, and the space around them
-spaces            the shapes' own coordinates, in which solid textures lie
 scene_bvh         the tree over the scene, and the few shapes that stand in a loop instead
 records           analytic shapes -> records with their bounds
-triangle_buffers  the finished arrays of all triangles, in shared memory
-shape_records     members of the records of all kinds: hidden shapes, lights
+shape_records     members of the records of all kinds: hidden shapes, lights, what fills shapes, solid coordinates
 rebase            the origin that float32 coordinates are relative to
 parallel          work over many rows, in threads
 warnings          equal warnings about many shapes as one with a count; odd meshes whose materials show it

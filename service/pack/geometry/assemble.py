@@ -1,9 +1,11 @@
 """Shapes -> records, with those of area lights, and the tree: the part that does not depend on camera, sky or
-colours."""
+colours. Parts of earlier geometries are reused in the next one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+import operator
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,16 +14,15 @@ from gpu.layout import ShapeKind
 from service.document.shape import Shape
 from service.formats import Assets
 from service.pack.geometry import instances, meshes, scene_bvh
-from service.pack.geometry.geometry import Geometry, MeshExtents
+from service.pack.geometry.geometry import Geometry, MeshExtents, write_triangles
 from service.pack.geometry.meshes import Triangles
 from service.pack.geometry.rebase import Rebased, rebase
 from service.pack.geometry.records import Bounds
-from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.scene_bvh import SceneBvh, build_scene_bvh, stand_out
 from service.pack.geometry.shape_records import area_lights, hide
-from service.pack.geometry.triangle_buffers import write_triangles
+from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.warnings import counted
-from service.pack.geometry.world import ShapeMaterials, World, place
+from service.pack.geometry.world import ShapeMaterials, World, place, place_analytic
 from service.pack.parameters import vec3
 from service.system.shared_memory import LEAST, SharedArena, trim
 
@@ -146,3 +147,65 @@ def _mesh_extents(world: World, key: Hashable) -> MeshExtents:
         key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), counted(world.mesh_warnings),
         tuple(world.odd),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """Geometries that were packed before, the newest last, and the keys by which a new one is compared with them."""
+
+    geometries: Sequence[Geometry] = ()
+    contents: Sequence[Hashable] | None = None  # a key of each shape
+    mesh_key: Hashable = None  # of all meshes, none of which shines; None: they cannot be compared
+
+    @property
+    def models(self) -> Mapping[Hashable, SharedMesh]:
+        """The shared meshes that need not be made again, by their keys."""
+        return {model.key: model for earlier in self.geometries for model in earlier.models}
+
+    def among_other_shapes(self, shapes: Sequence[Shape], materials: ShapeMaterials) -> Geometry | None:
+        """The newest geometry with the same meshes, now beside `shapes`; None where no geometry has them.
+
+        Raises InvalidDocument.
+        """
+        for earlier in reversed(self.geometries):
+            if self.mesh_key is not None and earlier.meshes.key == self.mesh_key:
+                same = _among_other_shapes(earlier, shapes, materials)
+                if same is not None:
+                    return same
+        return None
+
+    def unshared_key(self, world: World, origin: np.ndarray, materials: ShapeMaterials) -> Hashable:
+        """The key of the triangles that no instance shows."""
+        if self.contents is None or any(materials.names[m.material] in materials.emissive for m in world.meshes):
+            return None
+        own = tuple((mesh.shape, self.contents[mesh.shape]) for mesh in world.meshes)
+        return own, vec3(origin) if own else None, tuple(materials.names), tuple(materials.charts.items())
+
+    def same_triangles(self, unshared_key: Hashable, models: Sequence[SharedMesh]) -> Geometry | None:
+        """The newest geometry with the same triangles in the same order, or None."""
+        for earlier in reversed(self.geometries):
+            same = len(earlier.models) == len(models) and all(map(operator.is_, earlier.models, models))
+            if same and unshared_key is not None and earlier.unshared_key == unshared_key:
+                return earlier
+        return None
+
+
+def _among_other_shapes(earlier: Geometry, shapes: Sequence[Shape], materials: ShapeMaterials) -> Geometry | None:
+    """The meshes of `earlier` among these shapes; None where the meshes' records or their tree would differ."""
+    if earlier.bvh_kinds - {ShapeKind.TRIANGLE, ShapeKind.INSTANCE}:
+        return None
+    rebased = rebase(place_analytic(shapes, materials), earlier.meshes)
+    crowded = any(len(records) > scene_bvh.LINEAR[kind] for kind, records in rebased.records.items())
+    if crowded or vec3(rebased.origin) != earlier.origin:
+        return None
+    triangles = earlier.shapes[ShapeKind.TRIANGLE]
+    hide(tuple(rebased.records.values()), shapes)
+    lights, areas = area_lights(rebased.records, triangles[:0], materials)  # none of the triangles shines
+    return replace(
+        earlier,
+        shapes={**rebased.records, ShapeKind.TRIANGLE: triangles},
+        lights=lights,
+        areas=areas,
+        radius=rebased.radius,
+        warnings=(*earlier.meshes.warnings, *rebased.warnings),
+    )

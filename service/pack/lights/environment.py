@@ -22,7 +22,7 @@ from service.document.environment import (
 )
 from service.document.numbers import BRIGHTEST
 from service.formats import Assets, ImageData
-from service.pack.edits.cache import lasting
+from service.pack.cache import lasting
 from service.pack.lights.environment_blur import blur_cube, blur_image
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.system.memory import takes

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind
-from service.pack.edits.cache import PackCache, digest
+from service.pack.cache import PackCache, digest
 from service.pack.lights.lights import SHINING
 
 MANY = 4

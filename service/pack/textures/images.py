@@ -17,7 +17,7 @@ from service.document.texture import (
     ImageTexture,
 )
 from service.formats import Assets, ImageData
-from service.pack.edits.cache import PackCache, lasting
+from service.pack.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
 from service.system.memory import takes

@@ -24,7 +24,7 @@ from service.document.texture import (
     is_projected,
 )
 from service.formats import Assets, ImageData
-from service.pack.edits.cache import PackCache, lasting
+from service.pack.cache import PackCache, lasting
 from service.pack.parameters import member_of
 from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
 from service.pack.textures.recipes import listed, recipe_flags, recipe_words, room_for_stops

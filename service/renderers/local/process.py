@@ -20,9 +20,9 @@ from typing import Any, Literal, Protocol
 from service.config import Ahead
 from service.ipc import channel, heartbeat
 from service.ipc.server_end import Channel
+from service.system import logs
 from service.system.child_processes import inherited_environment
-from service.system.cpu_time import RunnableTime
-from service.system.logs import setup
+from service.system.cpu import RunnableTime
 
 ROOT = Path(__file__).parents[3]
 TURNS = 10  # how many times as long as the last one a piece of work may take, beyond the patience
@@ -238,7 +238,7 @@ def _spawn(
     end: socket.socket, heartbeat_descriptor: int, options: Options, lifeline: int | None
 ) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.worker", str(end.fileno()), str(heartbeat_descriptor)]
-    command += ["--server", str(os.getpid()), "--log-level", str(setup.level())]
+    command += ["--server", str(os.getpid()), "--log-level", str(logs.level())]
     command += ["--checkpoint", str(options.checkpoint_s), "--ahead", options.ahead, "--nice", str(options.nice)]
     command += ["--name", options.name, *(["--software"] if options.software else [])]
     command += [] if options.device is None else ["--device", str(options.device)]

@@ -16,9 +16,8 @@ from service.renderers.local.process import Options, Process
 from service.renderers.pool.devices import listed, of_cuda
 from service.renderers.ray.code import version
 from service.renderers.ray.control import Ended
-from service.system.background import Background, reported
+from service.system.background import Background, reported, within
 from service.system.memory import MemoryBudget
-from service.system.waiting import within
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 WATCH_S = 0.5

@@ -23,9 +23,9 @@ from service.renderers.ray.control import Join, Joined, Open, Refused, Release
 from service.renderers.ray.joining import INSTALL, CannotJoin
 from service.renderers.ray.process import ClusterProcess
 from service.renderers.ray.renderers import described
+from service.system import logs
 from service.system.child_processes import inherited_environment
 from service.system.executors import tending
-from service.system.logs import setup
 
 JOIN_S = 80.0  # for the gateway to start and to join, which it gives up itself much earlier
 SILENT_S = 20.0  # without a sign of life, one of which comes every second
@@ -152,7 +152,7 @@ def _start(ask: Join) -> _Gateway:
     command = [sys.executable, "-m", "service.renderers.ray.gateway", str(theirs.fileno())]
     with theirs:
         process = subprocess.Popen(
-            [*command, "--log-level", str(setup.level())],
+            [*command, "--log-level", str(logs.level())],
             pass_fds=[theirs.fileno()],
             cwd=ROOT,
             env={**RAY, **_token_mode(), **inherited_environment("RAY_AUTH_TOKEN")},

@@ -27,8 +27,8 @@ from service.renderers.ray.control import Alive, Join, Joined, Open, Refused, Re
 from service.renderers.ray.joining import CannotJoin, close_token_file, has_token, join, survey
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described
+from service.system import logs
 from service.system.background import Background
-from service.system.logs import setup
 
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
@@ -154,7 +154,7 @@ def main() -> int:
     arguments = parser.parse_args()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the server, which ends this process in good order
     sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)  # for the loggers only
-    setup.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
+    logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     sys.stderr = sys.__stderr__
     _keep_others_from_writing()
     os.umask(0o077)  # what Ray writes, its token first of all, is this user's alone

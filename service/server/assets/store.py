@@ -11,15 +11,23 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from service.formats.cache import Parsed, ParsedCache, as_image, as_measured, as_mesh, refused
-from service.formats.describe import describe
+from service.formats.cache import Parsed, ParsedCache, as_image, as_measured, as_mesh, describe, refused
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
-from service.formats.limits import HasLimits, asset_limits
 from service.formats.read.scenes.plain_mesh import plain_scene
 from service.formats.scene_import import Imported, take_apart
 from service.formats.source import Source, digest, for_sandbox, format_of, length
-from service.formats.types import AssetInfo, ImageData, Kind, MeasuredData, MeshData, SceneFile, ScenePart
+from service.formats.types import (
+    AssetInfo,
+    HasLimits,
+    ImageData,
+    Kind,
+    MeasuredData,
+    MeshData,
+    SceneFile,
+    ScenePart,
+    asset_limits,
+)
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from service.server.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
 from service.server.assets.integrity import Integrity, damaged

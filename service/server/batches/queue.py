@@ -16,10 +16,9 @@ from service.server.renders.retention import looked_at
 from service.server.renders.store.batch_rows import BatchOrder, StoredBatch
 from service.server.renders.store.record import IdempotencyKey, Order, Outcome
 from service.server.storage.asset_access import AllowedUses
-from service.system.background import Background
+from service.system.background import Background, within
 from service.system.executors import parsing, recording
-from service.system.turns import CALLER
-from service.system.waiting import within
+from service.system.shares import CALLER
 
 EACH = 32  # batches of one owner that are under way
 AGAIN_S = 5.0  # between two attempts to queue a render where there is no room

@@ -23,11 +23,9 @@ from service.server.callbacks.events import event
 from service.server.renders.render import Render
 from service.server.storage.callback_rows import Callback, CallbackRows, Kind
 from service.server.storage.database import Database
-from service.system.background import Background, reported
+from service.system.background import Background, reported, within
 from service.system.executors import answering, recording, resolving
-from service.system.shares import Shares
-from service.system.turns import CALLER
-from service.system.waiting import within
+from service.system.shares import CALLER, Shares
 
 if TYPE_CHECKING:
     import ssl

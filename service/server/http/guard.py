@@ -28,8 +28,7 @@ from service.problems import (
 )
 from service.server.http.connection_limits import network_of
 from service.server.http.keys import PROTOCOL, Keys
-from service.system.shares import Shares
-from service.system.turns import CALLER
+from service.system.shares import CALLER, Shares
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}

@@ -12,7 +12,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import Internal, ServiceError
-from service.system.logs.formatters import bound
+from service.system.logs import bound
 
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
 ID_BYTES = 9

@@ -16,7 +16,7 @@ from service.renderers.protocol import Listener, Renderers
 from service.server.renders.recorder import Recorder
 from service.server.renders.scene import RenderScene
 from service.server.renders.status import error_of
-from service.system.waiting import within
+from service.system.background import within
 
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ASK_AGAIN_S = 5  # for a client whose picture was lost with a renderer

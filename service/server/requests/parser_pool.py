@@ -23,7 +23,7 @@ from service.server.requests.parser_child import Failed, Work
 from service.server.requests.parsers import Kind, answer_classes
 from service.system.child_processes import Child, Children, Closed
 from service.system.garbage import collector_paused
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 
 BODIES = 1000  # for one child
 REMEMBERED = 1000  # callers whose last turn counts

@@ -21,8 +21,7 @@ from starlette.responses import Response, StreamingResponse
 
 from service.formats import images
 from service.formats.images import animation, over_black
-from service.formats.images.animation import MIME, AnimationFormat
-from service.formats.images.animator import Animator, most_memory
+from service.formats.images.animation import MIME, AnimationFormat, Animator, most_memory
 from service.formats.images.contact_sheet import ContactSheet
 from service.ipc.messages import View
 from service.problems import Conflict, Gone, NotProvided, TooLarge

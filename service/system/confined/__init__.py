@@ -3,9 +3,7 @@
 child         how a child that parses begins, and how it works within bounds
 limits        priority, memory, processor time, files: what a process may take
 rights        what it may do: everything that it does not need is given up for good
-landlock      files that may be opened, by the kernel's Landlock
-seccomp       system calls that may be made, by a filter in the kernel
-system_calls  the numbers of system calls, by processor
+kernel        the numbers of system calls, and the kernel's seccomp and Landlock
 
 The kernel's interfaces are called by ctypes. The packages for them on PyPI are no alternative: `landlock` and
 `py-landlock` have only preliminary releases, `pyseccomp` has had none since 2021 and needs libseccomp on the machine.

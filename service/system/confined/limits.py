@@ -10,7 +10,7 @@ import resource
 import signal
 from functools import cache
 
-from service.system.priority import raise_thread_niceness
+from service.system.cpu import raise_thread_niceness
 
 CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
 DESCRIPTORS = 64  # a file, a few for its libraries, and those of the answer

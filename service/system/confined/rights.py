@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from service.system.confined import landlock, seccomp
-from service.system.confined.system_calls import SystemCalls, system_calls
+from service.system.confined.kernel import SystemCalls, allow_reading_only, filter_system_calls, system_calls
 
 ROOT = Path(__file__).parents[3]
 PR_SET_DUMPABLE, PR_CAPBSET_DROP, PR_SET_NO_NEW_PRIVS, PR_CAP_AMBIENT = 4, 24, 38, 47
@@ -49,8 +48,8 @@ def renounce(no_network: bool) -> Rights:
     hidden = hide()
     if calls is None:
         return Rights(no_new_privileges, no_capabilities, no_network, hidden)
-    restricted = landlock.restrict(calls, readable())
-    filtered = seccomp.restrict(calls)
+    restricted = allow_reading_only(calls, readable())
+    filtered = filter_system_calls(calls)
     return Rights(no_new_privileges, no_capabilities, no_network, hidden, restricted, filtered)
 
 

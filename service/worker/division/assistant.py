@@ -11,7 +11,7 @@ from service.ipc.leases import Lease, LeaseDone
 from service.ipc.messages import Update
 from service.worker.context import WorkerContext
 from service.worker.device.residency import Residency
-from service.worker.progress.progress import ProgressTracker
+from service.worker.progress import ProgressTracker
 from service.worker.scheduler import Account
 from service.worker.updates import Updates
 from service.worker.view.frames import SLICE_S

@@ -6,6 +6,7 @@ where no process can be started.
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import socket
@@ -13,18 +14,16 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
-from gpu import CompileError, cache_folder
+from gpu import CompileError, KernelKey, cache_folder
 from service.ipc import channel
 from service.ipc.messages import driver_of
 from service.system.memory import machine_memory
 from service.worker.helpers.compile_lane import TRIES, Compiled, Done, Lane, Refused
 from service.worker.helpers.process import HelperProcess
-from service.worker.helpers.used_kernels import UsedKernels
 
-if TYPE_CHECKING:
-    from gpu import KernelKey
+MOST = 32  # kernels: a minute of LLVM's time
 
 LIMIT_S = 300.0  # for one kernel that somebody waits for: LLVM takes up to a minute, NVIDIA's compiler as well
 SPARE_LIMIT_S = 3600.0  # ... and for one that gets no more of the processor than others leave
@@ -313,3 +312,54 @@ def _prune(records: Path) -> None:
 def records() -> Path:
     """The folder beside the driver's cache in which an empty file says that a kernel is in there."""
     return cache_folder() / "kernels"
+
+
+class UsedKernels:
+    """A record of the kernels that pictures were made with on this machine, the latest last. A new version of Sunbox
+    or of the driver needs all of them anew: those that were used here are compiled first.
+
+    It is a file, which other renderers of this user's may write as well: the last one has the last word.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._noted = set[KernelKey]()
+
+    def note(self, key: KernelKey) -> None:
+        """Put a kernel at the record's end, at its first use by this process."""
+        if key in self._noted:
+            return
+        self._noted.add(key)
+        kept = [each for each in self._read() if each != key][1 - MOST :]
+        temporary = self._path.with_name(f"{self._path.name}.{os.getpid()}")
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.write_text(json.dumps([_plain(each) for each in [*kept, key]]))
+            temporary.replace(self._path)
+        except OSError as error:
+            log.info("could not record a kernel that is used", {"error": error})
+
+    def latest_first(self) -> Iterator[KernelKey]:
+        """Those that this version of the shaders still has. To look at one takes some milliseconds."""
+        return filter(_is_known, reversed(self._read()))
+
+    def _read(self) -> list[KernelKey]:
+        with suppress(OSError, ValueError, TypeError, KeyError):  # nothing is there yet, or another version wrote it
+            return [_key(each) for each in json.loads(self._path.read_text())]
+        return []
+
+
+def _plain(key: KernelKey) -> dict[str, Any]:
+    return {"entry": key.entry, "defines": dict(key.defines), "textures": key.textures}
+
+
+def _key(plain: dict[str, Any]) -> KernelKey:
+    textures = tuple((unit, channels, dtype, w, h) for unit, channels, dtype, w, h in plain["textures"])
+    return KernelKey(tuple(plain["defines"].items()), textures, plain["entry"])
+
+
+def _is_known(key: KernelKey) -> bool:
+    try:
+        return bool(key.text)
+    except CompileError:  # the shaders have another flag now, or the file is gone
+        return False

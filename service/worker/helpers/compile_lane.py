@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from service.ipc import channel
 from service.system.child_processes import signal_name
-from service.system.cpu_time import RunnableTime
+from service.system.cpu import RunnableTime
 from service.worker.helpers.process import HelperProcess
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from typing import get_args
 
 from service.ipc import channel
 from service.system.confined import hide
+from service.system.cpu import HIGHEST, raise_thread_niceness
 from service.system.lifeline import end_with, end_with_pipe, hung_up
-from service.system.priority import HIGHEST, raise_thread_niceness
 from service.system.shared_memory import trim
 from service.worker.helpers.compile_client import Priority, records
 from service.worker.helpers.compile_lane import Compiled, Started

@@ -10,7 +10,7 @@ import pytest
 from service.document import parse_scene
 from service.formats import MeshData
 from service.formats.read.obj.importer import read_obj_scene
-from service.formats.sandbox.parse_mesh import parse_mesh
+from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 from service.pack import pack
 from tests import asset_files as make

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from service.formats import MeshData
-from service.formats.sandbox.parse_mesh import parse_mesh
+from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]]

@@ -13,7 +13,7 @@ from service.formats.read.scenes.framing import framed
 from service.formats.read.scenes.plain_mesh import plain_scene
 from service.formats.read.scenes.rays import Placed
 from service.formats.read.scenes.room import stand_inside
-from service.formats.sandbox.parse_mesh import parse_mesh
+from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 from tests import asset_files as make
 from tests.obj_files import zipped

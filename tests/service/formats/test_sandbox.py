@@ -22,9 +22,9 @@ from service.formats.sandbox import sandbox
 from service.formats.sandbox.sandbox import Sandbox
 from service.formats.sandbox.wire import adopt, memory, publish
 from service.formats.types import AssetLimits, MeshOddities
-from service.system import child_processes, cpu_time
+from service.system import child_processes, cpu
 from service.system.child_processes import Children
-from service.system.priority import working_niceness
+from service.system.cpu import working_niceness
 from tests.asset_files import OBJ, TRIANGLE, exr
 from tests.serving import wait_until
 
@@ -116,7 +116,7 @@ def test_waiting_for_a_processor_is_not_the_files_fault(box: Sandbox, monkeypatc
         waited += 10**12
         return {pid: (0, waited)}
 
-    monkeypatch.setattr(cpu_time, "ran", starved)
+    monkeypatch.setattr(cpu, "ran", starved)
     os.kill(pid, signal.SIGSTOP)
     going_on = threading.Timer(1.0, os.kill, [pid, signal.SIGCONT])
     going_on.start()

@@ -12,7 +12,7 @@ import pytest
 
 from service.formats.cache import refused
 from service.formats.errors import MissingExtra, ParseError
-from service.formats.sandbox import parse_usd
+from service.formats.sandbox import readers
 from service.formats.types import AssetLimits
 from service.problems import ANSWERS, AssetError, NotProvided
 from service.server.assets import AssetStore
@@ -119,9 +119,9 @@ def test_broken_binary_layers_end_a_child_at_most(store: AssetStore, tmp_path: P
 
 def test_without_the_extra_the_refusal_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr(parse_usd, "find_spec", lambda name: None)
+    monkeypatch.setattr(readers, "find_spec", lambda name: None)
     with pytest.raises(MissingExtra) as caught:
-        parse_usd.read_usd_scene(memoryview(usda(mesh("Sign"))), AssetLimits())
+        readers.read_usd_scene(memoryview(usda(mesh("Sign"))), AssetLimits())
     answer = refused("the USD file", caught.value)
     assert isinstance(answer, NotProvided) and "sunbox-server[usd]" in answer.detail
     assert ANSWERS[NotProvided].status == 501

@@ -10,7 +10,7 @@ import trimesh
 
 from service.document import Scene, parse_scene
 from service.pack import pack
-from service.pack.edits.cache import PackCache
+from service.pack.cache import PackCache
 from service.pack.geometry import displacement
 from service.problems import InvalidDocument
 from service.server.streams.scene_diff import scene_diff

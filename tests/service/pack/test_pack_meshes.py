@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.pack.edits.cache import PackCache
+from service.pack.cache import PackCache
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.parallel import CHUNK
 from service.pack.geometry.vertex_normals import corner_normals, encode

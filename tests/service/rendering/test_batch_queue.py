@@ -26,7 +26,7 @@ from service.server.renders.store.store import RenderStore
 from service.server.requests.request_parser import folded
 from service.server.requests.request_reader import RequestReader
 from service.server.storage.asset_access import NO_USES
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 from tests.documents import Shelf
 from tests.queues import LIMITS
 from tests.service.rendering.fakes import PACKED, Quick, Renderers, load, until

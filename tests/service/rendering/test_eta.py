@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from service.ipc.messages import StopRule
-from service.worker.progress.eta import EtaEstimate
+from service.worker.progress import EtaEstimate
 
 
 def gone(

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from service.system.executors import ClientExecutor, Pool
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 
 
 def test_a_flood_delays_its_sender_alone() -> None:

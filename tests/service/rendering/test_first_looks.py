@@ -21,7 +21,7 @@ from service.worker.helpers import first_look_client
 from service.worker.helpers.compile_client import CompileClient
 from service.worker.helpers.compile_lane import Compiled
 from service.worker.helpers.first_look_client import TRIES, FirstLookClient, Leave, Look, Wanted
-from service.worker.view.unoptimised_look import UnoptimisedLook
+from service.worker.view.first_look import UnoptimisedLook
 from tests.supervisors import LINEAR, Ears, Rendering, arrays_of, settings, with_supervisor
 
 SIDE = 64

@@ -16,11 +16,10 @@ from service.bench.scenes import BenchAssets
 from service.document import parse_scene, presets
 from service.ipc.messages import Foresee
 from service.pack import pack
-from service.system import power
 from service.worker import foreseen
 from service.worker.device.loaded_scene import begin_key, slider_keys
 from service.worker.foreseen import BUDGET_S, LONGEST_S, ForeseenKernels
-from service.worker.helpers.used_kernels import MOST, UsedKernels
+from service.worker.helpers.compile_client import MOST, UsedKernels
 from tests.supervisors import SIZE, arrays_of
 
 PLAIN, RICH = Foresee(1, arrays_of("plain"), SIZE), Foresee(1, arrays_of("rich"), SIZE)
@@ -108,9 +107,9 @@ def test_power_to_spare(supplies: Any, spare: bool, tmp_path: Path, monkeypatch:
         (tmp_path / name / "type").write_text(f"{kind}\n")
         if online:
             (tmp_path / name / "online").write_text(f"{online}\n")
-    monkeypatch.setattr(power, "SUPPLIES", tmp_path)
-    monkeypatch.setattr(power, "QUOTA", tmp_path / "none")
-    assert power.has_power_to_spare() == spare
+    monkeypatch.setattr(foreseen, "SUPPLIES", tmp_path)
+    monkeypatch.setattr(foreseen, "QUOTA", tmp_path / "none")
+    assert foreseen.has_power_to_spare() == spare
 
 
 @pytest.mark.parametrize(("quota", "spare"), [("max 100000", True), ("150000 100000", True), ("50000 100000", False)])
@@ -118,9 +117,9 @@ def test_a_part_of_a_processor_is_nothing_to_spare(
     quota: str, spare: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "cpu.max").write_text(f"{quota}\n")
-    monkeypatch.setattr(power, "SUPPLIES", tmp_path / "none")
-    monkeypatch.setattr(power, "QUOTA", tmp_path / "cpu.max")
-    assert power.has_power_to_spare() == spare
+    monkeypatch.setattr(foreseen, "SUPPLIES", tmp_path / "none")
+    monkeypatch.setattr(foreseen, "QUOTA", tmp_path / "cpu.max")
+    assert foreseen.has_power_to_spare() == spare
 
 
 def test_a_record_keeps_the_latest_kernels_over_a_restart(tmp_path: Path) -> None:

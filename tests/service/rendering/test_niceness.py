@@ -15,13 +15,13 @@ import pytest
 from service import containers
 from service.config import NICENESS, load_config
 from service.renderers.pool.devices import seats
-from service.system import priority
-from service.system.priority import raise_thread_niceness
+from service.system import cpu
+from service.system.cpu import raise_thread_niceness
 from tests.serving import SCENE, SMALL, Server, families
 
 GIVES_WAY = """
 import os, threading
-from service.system.priority import raise_process_niceness
+from service.system.cpu import raise_process_niceness
 
 def give_way():
     os.setpriority(os.PRIO_PROCESS, 0, 19)
@@ -49,7 +49,7 @@ WORKERS = (
 PACKS = """
 import asyncio, os, sys
 from service.system.executors import packing
-from service.system.priority import set_steps
+from service.system.cpu import set_steps
 
 os.nice(10)
 set_steps(int(sys.argv[1]))
@@ -139,7 +139,7 @@ def test_a_refusal_is_logged_once_and_ends_nothing(
 
     monkeypatch.setattr(os, "getpriority", lambda *_: 0)  # who starts the tests at 19 asks for nothing
     monkeypatch.setattr(os, "setpriority", refuse)
-    priority._log_refusal.cache_clear()
+    cpu._log_refusal.cache_clear()
     with caplog.at_level(logging.WARNING):
         raise_thread_niceness(19)
         raise_thread_niceness(19)

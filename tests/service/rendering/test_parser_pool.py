@@ -28,7 +28,7 @@ from service.server.requests import parser_pool
 from service.server.requests.parser_pool import ParserPool
 from service.server.requests.request_parser import RequestParser, unfolded
 from service.system.child_processes import Child
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 from tests.serving import SCENE, SMALL
 
 ROWS = [[0.5 * i, i % 7, -1e-3 * i] for i in range(3000)]

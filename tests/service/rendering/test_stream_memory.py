@@ -20,7 +20,7 @@ from service.server.requests.request_reader import RequestReader
 from service.server.streams import protocol
 from service.server.streams.edit_session import EditSession
 from service.server.streams.stream import WAITING_CHARACTERS, Stream
-from service.system.turns import CALLER
+from service.system.shares import CALLER
 from tests.serving import SCENE, SMALL
 
 KIB = 1 << 10

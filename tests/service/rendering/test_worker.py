@@ -40,8 +40,7 @@ from service.renderers.local.keeper import CLOSING
 from service.renderers.local.supervisor import Supervisor
 from service.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
 from service.worker.loop import Loop, coalesced
-from service.worker.progress.noise import NoiseReading
-from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
+from service.worker.progress import NoiseReading, judged_after, judged_from, late, reached
 from tests.documents import Shelf
 from tests.service.rendering.fakes import FakeProcesses, with_fake_processes
 from tests.serving import PATIENCE_S, SCENE

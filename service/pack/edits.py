@@ -1,5 +1,7 @@
 """The edit that leads from one scene to another in which shapes stand at other places, or which another environment
-lights: what must be uploaded."""
+lights: what must be uploaded. And that of a scene's camera, materials or environment's turn alone, for which
+nothing else is packed.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,12 @@ from typing import Any, cast
 import numpy as np
 
 from gpu import EnvironmentArrays, MovedArrays, SceneArrays, SceneEdit, TextureArrays
+from service.document import Scene
+from service.pack.measured import keep_measured
+from service.pack.microfacets import pack_microfacets
+from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.textures.words import repacked
+from service.pack.worn import places, worn
 
 MOVED = tuple(MovedArrays.__annotations__)  # the members that may differ
 MANY = ("nodes", "light_tree")  # those of them whose length may differ
@@ -66,3 +74,24 @@ def _same(a: Any, b: Any) -> bool:
         images = a.key == b.key != "" or (_same(a.texels, b.texels) and _same(a.floats, b.floats))
         return a.slots == b.slots and a.stops == b.stops and a.words.shape == b.words.shape and images
     return type(a) is type(b) and bool(a == b)
+
+
+def parameter_edit(
+    packed: SceneArrays, scene: Scene, camera: bool = False, materials: bool = False, environment: bool = False,
+    numbers: bool = False,
+) -> SceneEdit:  # fmt: skip
+    """The edit of the named parts that leads to `scene`, of which the rest is as it was `packed`. `numbers`: those of
+    its materials."""
+    whole, scene = scene, worn(scene)
+    e, textures = scene.environment, packed.textures
+    records = pack_materials(scene) if materials else None
+    if records is not None:
+        keep_measured(packed.materials, records)
+    return SceneEdit(
+        camera=pack_camera(scene.camera, packed.origin) if camera else None,
+        materials=records,
+        texture_words=repacked(textures, scene) if materials and textures else None,
+        microfacets=pack_microfacets(scene) if materials and len(packed.microfacets) else None,
+        environment=pack_turn(e) if environment and e is not None else None,
+        material_numbers=places(whole, scene) if numbers else None,
+    )

@@ -1,0 +1,128 @@
+"""Files -> what the rest may trust, in the parsing process. Meshes are arrays that are finite, in range and of
+bounded size; a zip is what is in it: an OBJ with its materials, MaterialX with its images, or images that make
+materials by their names; USD is read where its extra is installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from types import ModuleType
+
+import numpy as np
+
+from service.formats.errors import MissingExtra, ParseError
+from service.formats.formats import PACKAGES, text
+from service.formats.read.materialx.importer import ALONE, SUFFIX, read_materialx
+from service.formats.read.mesh_checks import mesh_oddities
+from service.formats.read.obj.archive import Archive
+from service.formats.read.obj.importer import read_obj_scene
+from service.formats.read.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
+from service.formats.read.stl import read_stl
+from service.formats.read.texture_sets.importer import read_texture_sets
+from service.formats.types import AssetLimits, Floats, Indices, MeshData, SceneFile
+
+
+def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
+    """Raises ParseError, or whatever a library raises on nonsense."""
+    parts = MESH_READERS[format](data, limits)
+    check_raw_mesh(parts, limits.max_triangles)
+    # One after the other, so that a million triangles are not there twice.
+    vertices = np.ascontiguousarray(parts.vertices, np.float64)
+    faces: Indices = np.ascontiguousarray(parts.faces, np.int32)
+    parts.vertices, parts.faces = vertices, faces
+    normals = None if parts.normals is None else unit_normals(vertices, faces, parts.normals)
+    parts.normals = None
+    groups = None if parts.groups is None or normals is not None else np.ascontiguousarray(parts.groups, np.int32)
+    uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
+    tangents = _floats(parts.tangents)
+    parts.uvs = parts.uvs_1 = parts.tangents = None
+    colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
+    odd = mesh_oddities(vertices, faces, uvs, colors)
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents, groups, odd)
+
+
+def _floats(rows: Numbers | None) -> Floats | None:
+    return None if rows is None else np.ascontiguousarray(rows, np.float32)
+
+
+def _obj(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.formats.read.obj_mesh import read_obj
+
+    return read_obj(text(bytes(data)) if bytes(data[:1]) in (b"\xef", b"\xfe", b"\xff") else data)
+
+
+def _ply(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.formats.read.ply import read_ply
+
+    return read_ply(data)
+
+
+def _gltf(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.formats.read.gltf.merged_mesh import read_merged
+
+    return read_merged(data, limits)
+
+
+def _mtlx(data: memoryview, limits: AssetLimits) -> RawMesh:
+    raise ParseError("it holds materials; a mesh or an image is needed here")
+
+
+def _zip(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.formats.read.obj.importer import read_zipped_obj
+
+    return read_zipped_obj(data, limits)
+
+
+def read_usd_scene(data: memoryview, limits: AssetLimits) -> SceneFile:
+    """Raises ParseError, MissingExtra."""
+    found: SceneFile = _importer().read_scene(data, limits)
+    return found
+
+
+def read_usd_mesh(data: memoryview, limits: AssetLimits) -> RawMesh:
+    """Raises ParseError, MissingExtra."""
+    found: RawMesh = _importer().read_merged(data, limits)
+    return found
+
+
+def _importer() -> ModuleType:
+    package, module = PACKAGES["usd"]
+    if find_spec(module) is None:
+        raise MissingExtra(f"USD files need {package} on the server")
+    from service.formats.read.usd import importer
+
+    return importer
+
+
+def parse_zip(data: memoryview, limits: AssetLimits) -> SceneFile:
+    """Raises ParseError."""
+    archive = Archive(data, limits.max_file)
+    if any(name.lower().endswith(".obj") for name in archive.names):
+        return read_obj_scene(data, limits)
+    if any(name.lower().endswith(SUFFIX) for name in archive.names):
+        try:
+            return read_materialx(archive.names, archive.read, limits)
+        except MissingExtra as missing:
+            try:
+                return read_texture_sets(archive, limits)  # its names may say as much
+            except ParseError:
+                raise missing from None
+    return read_texture_sets(archive, limits)
+
+
+def parse_mtlx(data: memoryview, limits: AssetLimits) -> SceneFile:
+    """A `.mtlx` file that came without images. Raises ParseError."""
+    return read_materialx([ALONE], lambda name: bytes(data), limits)
+
+
+MESH_READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
+    "obj": _obj,
+    "ply": _ply,
+    "stl": read_stl,
+    "glb": _gltf,
+    "gltf": _gltf,
+    "zip": _zip,
+    "mtlx": _mtlx,
+    "usd": read_usd_mesh,
+}
