@@ -3,7 +3,6 @@
 scene               the arrays of a whole scene, from a document and its assets
 parameters          camera, materials, the environment's rotation: their edits need no other module here
 measured            measured reflection, by files
-microfacets         the terms of `microfacet`, and the tables for those that have no closed form
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with their probabilities, and environments with the tables that draw from them
 textures            images -> texels, and the numbers of materials that read them
@@ -19,8 +18,7 @@ from service.pack.edits import parameter_edit, scene_edit
 from service.pack.geometry.scene_bvh import warm_builder
 from service.pack.lights.environment_blur import CUBE_FACES
 from service.pack.lights.light_bounds import warm_light_tree
-from service.pack.microfacets import pack_microfacets
-from service.pack.parameters import pack_camera, pack_materials
+from service.pack.parameters import pack_camera, pack_materials, pack_microfacets
 from service.pack.scene import Packed, lone_material, pack, pack_material
 from service.pack.worn import places, renamed, worn
 

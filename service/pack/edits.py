@@ -13,8 +13,7 @@ import numpy as np
 from gpu import EnvironmentArrays, MovedArrays, SceneArrays, SceneEdit, TextureArrays
 from service.document import Scene
 from service.pack.measured import keep_measured
-from service.pack.microfacets import pack_microfacets
-from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.parameters import pack_camera, pack_materials, pack_microfacets, pack_turn
 from service.pack.textures.words import repacked
 from service.pack.worn import places, worn
 

@@ -1,4 +1,6 @@
-"""The camera, the materials and the environment's rotation: an edit changes these without packing anything else."""
+"""The camera, the materials with the terms of `microfacet`, and the environment's rotation: an edit changes these
+without packing anything else.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +10,24 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import CameraKind, models
+from gpu.layout.microfacet_records import TERMS, Distribution, Microfacet
+from gpu.tables import microfacet as tables
 from service.document import Scene
 from service.document.camera import AnyCamera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
 from service.document.environment import Environment, SkyEnvironment
 from service.document.material import Material
+from service.document.material.microfacet import MicrofacetMaterial
 from service.document.material.surface import SolidSurface
 from service.document.numbers import Vec3
 from service.document.texture import ColorTexture, ScalarTexture
 
 # The renderer's names of a material's parameters, where they differ from the document's.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
+
+
 RENAMED |= {"abbe": "dispersion", "normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
+
+
 # Names that mean something else in one model.
 RENAMED_IN = {
     "blinn_phong": {"specular": "phong_specular"},
@@ -152,3 +161,43 @@ def pack_turn(environment: Environment) -> tuple[float, float]:
 def vec3(v: np.ndarray) -> Vec3:
     x, y, z = v.tolist()
     return x, y, z
+
+
+def pack_microfacets(scene: Scene) -> np.ndarray:
+    """(n, 4) uint32 as `gpu.layout.microfacet_records` says; empty where no material is of that model."""
+    records = np.zeros(len(scene.materials), Microfacet.dtype)
+    rows: list[np.ndarray] = []
+    first = len(records) * Microfacet.words // 4
+    found = False
+    for record, material in zip(records, scene.materials.values(), strict=True):
+        if isinstance(material, MicrofacetMaterial):
+            found = True
+            made = _fill(record, material)
+            record["table"] = first
+            first += sum(map(len, made))
+            rows += made
+    if not found:
+        return np.zeros((0, 4), np.uint32)
+    return np.concatenate([part.view(np.uint32).reshape(-1, 4) for part in (records, *rows)])
+
+
+def _fill(record: np.void, material: MicrofacetMaterial) -> list[np.ndarray]:
+    """The rows of the material's table. Sets all members of `record` except the place where the table begins."""
+    for kind, terms in TERMS.items():
+        record[kind] = terms[getattr(material, kind).upper()]
+    record["gamma"], record["diffuse_roughness"] = material.gamma, material.diffuse_roughness
+    record["conductor_eta"] = material.conductor_eta or (1.0, 1.0, 1.0)
+    record["conductor_k"] = material.conductor_k or (0.0, 0.0, 0.0)
+    low, high = record["alpha_low"], record["alpha_high"] = material.alpha_range
+    distribution = Distribution[material.distribution.upper()]
+    masks = material.geometry.startswith("smith") and distribution not in tables.CLOSED_MASKING
+    if not masks and distribution in tables.CLOSED_FACTOR:
+        return []
+    textured = isinstance(material.alpha, ScalarTexture)
+    alphas = tables.row_alphas(distribution, low, high) if textured else [material.alpha]
+    rows = [tables.row(distribution, alpha, material.gamma, masks) for alpha in alphas]
+    offset = tables.ROW_OFFSETS.get(distribution, 0.0)
+    start, end = math.log(low + offset), math.log(high + offset)
+    record["rows"], record["row_texels"], record["row_offset"] = len(rows), len(rows[0]), offset
+    record["row_start"], record["row_scale"] = start, (len(rows) - 1) / (end - start)
+    return rows

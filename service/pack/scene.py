@@ -27,8 +27,7 @@ from service.pack.lights import lights
 from service.pack.lights.environment import PackedEnvironment, check_images, environment_key, pack_environment
 from service.pack.lights.light_bounds import Grown, grow_light_tree
 from service.pack.measured import pack_measured
-from service.pack.microfacets import pack_microfacets
-from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.parameters import pack_camera, pack_materials, pack_microfacets, pack_turn
 from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.heights import height_fields
 from service.pack.textures.uses import required_charts

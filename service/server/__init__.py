@@ -1,7 +1,7 @@
 """The server's process: what a request means, from the network to the disk.
 
 app         what is served: the routes and the editor's files
-launch      how a server starts
+launch      how a server starts, and the socket that it listens on
 state       what the routes share
 routes      the endpoints
 http        between the network and the routes
@@ -13,7 +13,5 @@ verdict     whether two pictures differ beyond noise
 streams     scenes that are edited while they are watched
 assets      uploaded assets, and files beside a scene
 storage     the data folder
-operation   what an operator watches
-first_frame  the first frame of a scene that no client asked for: for readiness, and to warm up
-file_formats  the formats that are read and written
+readiness   what is loaded at the start, and whether a picture can be rendered now: the first frame of a scene
 """

@@ -29,13 +29,13 @@ from service.renderers.pool.devices import seats
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.ray.joining import CannotJoin
 from service.renderers.ray.pool import cluster_pool
-from service.server.first_frame import foresee, warm_up
 from service.server.http.compression import Compressed
 from service.server.http.connection_limits import Watch
 from service.server.http.connections import connection_class
 from service.server.http.downloads import Pieces
 from service.server.http.guard import Guard, open_for_health, turning_away
 from service.server.http.request_log import Requests
+from service.server.readiness import foresee, warm_up
 from service.server.renders.queue import RenderQueue
 from service.server.renders.retention import QueueLimits, Retention
 from service.server.renders.store.store import RenderStore

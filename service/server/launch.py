@@ -6,6 +6,7 @@ from __future__ import annotations
 import ipaddress
 import logging
 import resource
+import socket
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -15,7 +16,6 @@ from service.config import Config, cores, unknown_variables
 from service.renderers.local.process import EarlyStart
 from service.renderers.pool.devices import missing_device, seats
 from service.renderers.pool.pool import Seat
-from service.server.http.listener import listen
 from service.server.storage.data_lock import FolderInUse, locked
 from service.system.confined import hide
 from service.system.cpu import set_steps
@@ -90,3 +90,22 @@ def _take_descriptors() -> int:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
         return most
     return DESCRIPTORS if soft == resource.RLIM_INFINITY else soft
+
+
+BACKLOG = 2048
+# TCP keep-alive: a peer that vanished without closing is noticed after two minutes.
+PROBE_AFTER_S, PROBE_EVERY_S, PROBES = 60, 15, 4
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket whose options each accepted connection inherits. Raises OSError."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.create_server((host, port), family=family, backlog=BACKLOG)
+    # asyncio sets TCP_NODELAY only for sockets of a stated protocol. Without it an answer in two writes waits 40 ms
+    # for the client's delayed acknowledgement of the first.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, PROBE_AFTER_S)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, PROBE_EVERY_S)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, PROBES)
+    return listener

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib import metadata
-from typing import Any
+from typing import Any, get_args
 
 from starlette.requests import HTTPConnection
 
@@ -17,19 +17,20 @@ from service import displays
 from service.config import Config
 from service.document import Scene
 from service.document.quality import priced
+from service.exports import FORMATS
+from service.formats.formats import COMPRESSIONS, KINDS, missing
+from service.formats.images import animation
 from service.pack import Packed
 from service.problems import Unavailable
 from service.renderers.bsdf_questions import BsdfQuestions
 from service.renderers.protocol import Member, Renderers
-from service.server import file_formats
 from service.server.batches.batch import Batch
 from service.server.batches.members import Members
 from service.server.batches.queue import BatchQueue
 from service.server.callbacks.queue import Callbacks
 from service.server.http.downloads import Downloads
-from service.server.operation.loading import Loading
-from service.server.operation.readiness import SOFTWARE, Readiness
-from service.server.operation.traffic import Traffic
+from service.server.http.request_log import Traffic
+from service.server.readiness import SOFTWARE, Loading, Readiness
 from service.server.renders.queue import RenderQueue
 from service.server.renders.render import Render
 from service.server.renders.store.record import Order, Outcome, StoredRender
@@ -42,7 +43,7 @@ from service.server.streams.sessions import Sessions
 from service.system.executors import packing
 from service.system.memory import MemoryBudget
 from service.system.shares import Shares
-from service.views import TONE_MAPS
+from service.views import TONE_MAPS, FileFormat
 
 MESSAGE_BYTES = 1 << 20  # of one message on a stream: larger geometry is uploaded as an asset
 MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end
@@ -107,7 +108,7 @@ class AppState:
             "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),
-            "formats": file_formats.told(),
+            "formats": file_formats(),
             "tone_maps": [*TONE_MAPS, *displays.names()],
         }
 
@@ -232,3 +233,24 @@ def owner_of(connection: HTTPConnection) -> str:
 def bodiless(connection: HTTPConnection) -> bool:
     """Whether the request is for the head of the answer only."""
     return bool(connection.scope.get("bodiless", False))
+
+
+READ_FORMATS = {
+    "meshes": "mesh",
+    "scenes": "scene",
+    "images": "image",
+    "luts": "lut",
+    "measured": "measured",
+}  # names of lists, by the kind of asset
+
+
+def file_formats() -> dict[str, Any]:
+    return {
+        "pictures": list(get_args(FileFormat)),
+        "animations": list(animation.FORMATS),
+        **{name: [format for format, each in KINDS.items() if each == kind] for name, kind in READ_FORMATS.items()},
+        "materials": ["zip", "mtlx"],
+        "exports": [name for name, each in FORMATS.items() if each.has_scenes and each.is_provided],
+        "compressions": list(COMPRESSIONS),
+        "missing": missing(),
+    }

@@ -16,10 +16,9 @@ from service.document.quality import ResolvedSettings, resolve
 from service.ipc.messages import View
 from service.pack import Packed, pack
 from service.server.routes.examples import SCENE
-from service.server.verdict.comparison import ways_of
+from service.server.verdict.comparison import of_two_documents, seeds_from, ways_of
 from service.server.verdict.decision import decide
 from service.server.verdict.evidence import Estimate, Evidence
-from service.server.verdict.schedule import of_two_documents, seeds_from
 from service.worker.in_process import InProcessRenderer
 from tests.rendering import Images
 

@@ -22,7 +22,7 @@ from service.server.http import connection_limits, guard
 from service.server.http.connection_limits import Room, Watch
 from service.server.http.connections import connection_class
 from service.server.http.guard import Guard, open_for_health, turning_away
-from service.server.http.listener import listen
+from service.server.launch import listen
 from service.server.routes.errors import respond
 
 LARGE = 4 << 20

@@ -150,7 +150,7 @@ def test_a_vanished_peer_is_noticed(server: Server) -> None:
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
 def test_a_listener_hands_its_options_on(host: str) -> None:
-    from service.server.http.listener import listen
+    from service.server.launch import listen
 
     try:
         listener = listen(host, 0)

@@ -25,8 +25,8 @@ from service.ipc.messages import Progress, View
 from service.renderers.pool.pool import Pool
 from service.server.app import create_app
 from service.server.batches.batch import Batch, member_id
-from service.server.http.keys import Keys
-from service.server.operation.readiness import Readiness
+from service.server.http.guard import Keys
+from service.server.readiness import Readiness
 from service.server.renders.render import Render
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import Order, Outcome

@@ -19,8 +19,7 @@ from websockets.typing import Subprotocol
 from service.config import Config, ConfigError, load_config
 from service.problems import TooLarge, Unauthorized
 from service.server.http.downloads import disconnected
-from service.server.http.guard import Guard, _Body
-from service.server.http.keys import Keys
+from service.server.http.guard import Guard, Keys, _Body
 from service.server.routes.errors import respond
 from tests.asset_files import OBJ
 from tests.calls import is_problem

@@ -61,8 +61,8 @@ CODE = {
     "server/http/guard.py (self._of_keys, self._of_addresses) = Shares": SHARES,
     "ipc/channel.py MOST": "descriptors of one message",
     "ipc/channel.py ROOM": "bytes of one message",
-    "system/logs/output.py MOST_QUEUED": "lines of the log; beyond them lines are left out, and counted",
-    "system/logs/output.py self.records = Queue": "lines of the log; beyond them lines are left out, and counted",
+    "system/logs.py MOST_QUEUED": "lines of the log; beyond them lines are left out, and counted",
+    "system/logs.py self.records = Queue": "lines of the log; beyond them lines are left out, and counted",
     "pack/geometry/parallel.py ThreadPoolExecutor": INSIDE,
     "pack/textures/images.py AT_ONCE": INSIDE,
     "pack/textures/images.py ThreadPoolExecutor": INSIDE,
@@ -128,9 +128,9 @@ CODE = {
     "system/executors.py run_in_executor": "the thread of one client",
     "system/memory.py shares = Shares": SHARES,
     "worker/division/home.py EACH": "leases of one renderer",
-    "worker/helpers/used_kernels.py MOST": "a record: the latest put the oldest out",
-    "worker/view/view_tables.py MOST": "a cache: what makes room is made again",
-    "worker/warming.py ProcessPoolExecutor": "of the command alone",
+    "worker/helpers/compile_client.py MOST": "a record: the latest put the oldest out",
+    "worker/view/frames.py MOST": "a cache: what makes room is made again",
+    "worker/foreseen.py ProcessPoolExecutor": "of the command alone",
 }
 OF_ONE = "of one request, file or scene"
 SETTINGS = {

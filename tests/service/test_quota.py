@@ -14,7 +14,7 @@ import pytest
 from service.config import Config
 from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
 from service.server.assets import AssetStore
-from service.server.assets.folder_totals import TOTALS
+from service.server.assets.folder import TOTALS
 from service.server.storage.documents import checked
 from service.server.storage.stores import Storage, storage
 from service.system.disk_usage import BLOCK, Usage

@@ -17,10 +17,9 @@ from service.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, U
 from service.problems import Unavailable
 from service.renderers.protocol import Listener
 from service.renderers.statistics import Kind, Statistics
-from service.server.first_frame import foresee, warm_up
+from service.server import readiness
 from service.server.http.downloads import Downloads
-from service.server.operation import readiness
-from service.server.operation.readiness import Readiness
+from service.server.readiness import Readiness, foresee, warm_up
 from service.server.requests.request_reader import RequestReader
 from service.system.memory import MemoryBudget
 

@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from service.pack.edits.cache import CacheBudget, PackCache
+from service.system.turns import CALLER, Turns
 
 from service.formats.cache import ParsedCache
 from service.formats.source import digest
 from service.formats.types import AssetLimits, MeasuredData
-from service.pack.edits.cache import CacheBudget, PackCache
 from service.server.assets.folder import AssetFolder
 from service.server.assets.integrity import Integrity
 from service.server.renders.scene import PackedScenes
@@ -36,7 +37,6 @@ from service.system.child_processes import Children
 from service.system.disk_usage import Usage
 from service.system.executors import Pool
 from service.system.memory import MemoryBudget
-from service.system.turns import CALLER, Turns
 from tests.service.rendering.stored import picture
 from tests.serving import wait_until
 
@@ -50,10 +50,10 @@ CHANGED = {
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",
-    "system/priority.py _steps": "set once, before there are threads",
+    "system/cpu.py _steps": "set once, before there are threads",
     "system/shared_memory.py _blocks": "a lock for changes; listed by `copy`, which is one step of the interpreter",
-    "worker/view/view_tables.py _baked": "of the renderer's thread",
-    "worker/warming.py _compiling": "of a process with one thread",
+    "worker/view/frames.py _baked": "of the renderer's thread",
+    "worker/foreseen.py _compiling": "of a process with one thread",
 }
 # Classes for any thread that have no lock, and why they need none.
 WITHOUT = {

@@ -2,8 +2,7 @@
 
 store         uploaded assets
 rendered      uploaded pictures that Sunbox rendered, with what their noise is
-folder        the files of the store, each written whole or not at all
-folder_totals  the disk space of all assets, updated with each change
+folder        the files of the store, each written whole or not at all, and the disk space of all
 integrity     whether the bytes on the disk still match their hash
 local_files   assets that are files beside a scene
 posing        a scene's file with other materials, or at a time of its animation

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import json
 import logging
 import random
 import time
@@ -12,15 +13,15 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from service.callback_hosts import CallbackHosts
 from service.config import Config
 from service.problems import FieldError, InvalidDocument, ServiceError, TooManyRequests
 from service.server.batches.batch import Batch
 from service.server.callbacks import signing
-from service.server.callbacks.events import event
 from service.server.renders.render import Render
+from service.server.renders.status import iso
 from service.server.storage.callback_rows import Callback, CallbackRows, Kind
 from service.server.storage.database import Database
 from service.system.background import Background, reported, within
@@ -29,6 +30,7 @@ from service.system.shares import CALLER, Shares
 
 if TYPE_CHECKING:
     import ssl
+
 
 AT_ONCE = 16  # attempts, of which an owner has its share: half of what others leave
 OF_ONE_HOST = 2  # of these: a host that does not answer leaves room for the others
@@ -227,3 +229,21 @@ def _prepared() -> ssl.SSLContext:
     from service.server.callbacks import posting
 
     return posting.tls()
+
+
+OF_RENDERS = (
+    "id", "state", "label", "created", "started", "ended", "reason", "samples", "noise", "elapsed_s", "problem",
+)  # fmt: skip
+OF_BATCHES = ("id", "state", "label", "created", "counts")
+LONGEST = 500  # characters of each part of a problem: the rest is in the render's status
+
+
+def event(of: Kind, status: dict[str, Any]) -> str:
+    """The body of a callback, as JSON: `type` and `timestamp` are those of Standard Webhooks."""
+    names = OF_RENDERS if of == "render" else OF_BATCHES
+    data: dict[str, Any] = {name: status[name] for name in names if name in status}
+    if (problem := data.get("problem")) is not None:
+        parts = (name for name in ("type", "title", "detail") if name in problem)
+        data["problem"] = {name: str(problem[name])[:LONGEST] for name in parts}
+    body = {"type": f"{of}.ended", "timestamp": iso(time.time()), "data": data}
+    return json.dumps(body, ensure_ascii=False, separators=(",", ":"))

@@ -6,10 +6,12 @@ Plain ASGI. Refusals are the errors of `problems.py`, answered by `refuse`; a st
 from __future__ import annotations
 
 import asyncio
+import hmac
 import ipaddress
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from contextlib import ExitStack, suppress
+from hashlib import sha256
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -27,7 +29,6 @@ from service.problems import (
     UnsupportedMedia,
 )
 from service.server.http.connection_limits import network_of
-from service.server.http.keys import PROTOCOL, Keys
 from service.system.shares import CALLER, Shares
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
@@ -64,6 +65,8 @@ PREFLIGHT = {
 EXPOSED = "etag, link, location, retry-after, x-request-id"
 
 Refuse = Callable[[ServiceError], ASGIApp]
+
+PROTOCOL = "sunbox.key."  # a WebSocket subprotocol: browsers let a page send no header there
 
 
 class Guard:
@@ -297,3 +300,30 @@ def _origin(text: str) -> tuple[str, str, int | None]:
     """Scheme, host and port; `null` and nonsense have no host."""
     scheme, _, authority = text.strip().rstrip("/").partition("://")
     return (scheme.lower(), *_authority(authority, scheme.lower()))
+
+
+class Keys:
+    """Which key a request carries, and a name for its owner that reveals nothing of the key."""
+
+    def __init__(self, keys: Iterable[str]) -> None:
+        self._keys = [key.encode() for key in keys]
+
+    @property
+    def asked_for(self) -> bool:
+        return bool(self._keys)
+
+    def owner(self, authorization: str | None, protocols: Sequence[str] = ()) -> str:
+        """The owner of the key in the `Authorization` header or among the subprotocols. Raises Unauthorized."""
+        scheme, _, bearer = (authorization or "").partition(" ")
+        shown = [bearer.strip()] if scheme.lower() == "bearer" else []
+        shown += [protocol.removeprefix(PROTOCOL) for protocol in protocols if protocol.startswith(PROTOCOL)]
+        for key in shown:
+            # Every comparison takes the same time, wherever the keys differ.
+            matches = [hmac.compare_digest(key.encode(), known) for known in self._keys]
+            if any(matches):
+                return sha256(self._keys[matches.index(True)]).hexdigest()[:16]
+        raise Unauthorized(
+            "A key is needed: Authorization: Bearer KEY, or the WebSocket subprotocol sunbox.key.KEY."
+            if not shown
+            else "This key is not known here."
+        )

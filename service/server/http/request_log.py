@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import time
+from collections import Counter
 from collections.abc import Callable
 from secrets import token_hex
 
@@ -12,6 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import Internal, ServiceError
+from service.renderers.statistics import Distribution
 from service.system.logs import bound
 
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
@@ -71,3 +73,21 @@ def _path(scope: Scope) -> str:
     """The path, percent-encoded, so that it cannot end a line; without the query, which may hold a session's id."""
     raw: bytes = scope.get("raw_path") or b""
     return raw.partition(b"?")[0].decode("ascii", "replace")[:500]
+
+
+METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "WEBSOCKET")
+
+
+class Traffic:
+    """Requests since the server began."""
+
+    def __init__(self) -> None:
+        self.count: Counter[tuple[str, str, str]] = Counter()
+        self.seconds = Distribution()
+
+    def heard(self, method: str, route: str, status: int, seconds: float) -> None:
+        """Count a request. `route` is the address's pattern, "" for none: the number of addresses is unbounded."""
+        known = method if method in METHODS else "OTHER"
+        self.count[known, route or "other", str(status)] += 1
+        if known != "WEBSOCKET":
+            self.seconds.add(seconds)

@@ -12,11 +12,9 @@ events           the progress of renders as server-sent events
 waiting          waits that end when the client goes away
 stream           the stream's WebSocket
 materials        a material turned into another model
-export           a scene as another program's file
-exporting        what calls share that write such a file
+export           a scene as another program's file, and what calls share that write one
 bsdf             values of a material's BSDF
-assets           uploads
-asset_answers    what uploads are answered
+assets           uploads, and what they are answered
 documents        saved scenes and materials
 presets          built-in documents
 metrics          /metrics, in Prometheus' format

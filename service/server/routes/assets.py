@@ -17,12 +17,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.document import presets
 from service.document.text import dump_json
 from service.formats import AssetInfo
-from service.formats.types import Pose
+from service.formats.types import Kind, Pose
 from service.problems import FieldError, InvalidDocument, UnsupportedMedia
 from service.server.assets.posing import described, posed_scene
 from service.server.http.downloads import FileAnswer
 from service.server.requests.bodies import SMALL
-from service.server.routes import answers, asset_answers
+from service.server.routes import answers
+from service.server.routes.answers import Responses, reference
+from service.server.routes.example_answers import UPLOADED
 from service.server.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
 
@@ -34,13 +36,70 @@ SMALL_ASSET = 1 << 20  # bytes of a file that seldom takes longer than its hash 
 HEADER_BYTES = 4096  # proxies refuse headers that are much longer
 
 
+class AssetWarning(BaseModel):
+    pointer: str = Field(
+        description="The first place: RFC 6901 into the file's own JSON, or FILE:LINE of a zipped OBJ; may be empty."
+    )
+    detail: str
+    count: int | None = Field(None, description="How many places; not there where the pointer is the only one.")
+
+
+class AssetAnimation(BaseModel):
+    name: str
+    duration: float = Field(description="s; it begins at 0.")
+
+
+class Asset(BaseModel):
+    id: str
+    kind: Kind
+    format: str
+    bytes: int
+    width: int | None = Field(None, description="Of an image, texels.")
+    height: int | None = Field(None, description="Of an image, texels.")
+    channels: int | None = Field(None, description="Of an image.")
+    vertices: int | None = Field(None, description="Of a mesh.")
+    triangles: int | None = Field(None, description="Of a mesh or a scene.")
+    bounds: list[list[float]] | None = Field(None, description="Of a mesh or a scene: least and greatest x, y, z, m.")
+    warnings: list[AssetWarning] = Field(
+        description="What is odd about the file, and what it asks for and does not get."
+    )
+    exposure: float | None = Field(
+        None,
+        description="Of a scene whose own lights expose the picture more than 4 stops from middle grey: the exposure "
+        "in stops that suits them, metered from the logarithmic mean of the luminance in the camera's picture. "
+        "Photometric lights, such as Blender exports, need about -10.",
+    )
+    aspect_ratio: float | None = Field(
+        None, description="Of a scene whose camera says it: the width of its picture over the height."
+    )
+    variants: list[str] | None = Field(None, description="Of a scene: the variants of its materials, by name.")
+    animations: list[AssetAnimation] | None = Field(None, description="Of a scene.")
+
+
+class MaterialSet(BaseModel):
+    materials: dict[str, Any]
+    textures: dict[str, Any] = Field(description="All that the materials show, by name.")
+    warnings: list[AssetWarning] = Field(description="Which of its images are not used, and why.")
+
+
+ASSET_FILE: Responses = {
+    200: {
+        "description": "The file, or what it is.",
+        "content": {
+            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
+            "application/json": {"schema": reference("Asset"), "example": UPLOADED},
+        },
+    }
+}
+
+
 @router.post(
     "",
     status_code=201,
     summary="Upload a mesh, an image, a scene (glTF, or a zip of an OBJ with its materials), or a zip of textures",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
-    responses=answers.shaped(asset_answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
+    responses=answers.shaped(Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type", "")
@@ -128,7 +187,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     "/{id}/materials",
     summary="The materials of a zip of textures, or of a scene's file, with the textures that they show",
     response_class=JSONResponse,
-    responses=answers.shaped(asset_answers.MaterialSet, "The materials, by name.") | answers.problems(404, 422),
+    responses=answers.shaped(MaterialSet, "The materials, by name.") | answers.problems(404, 422),
 )
 async def materials(request: Request, id: answers.AssetId) -> Response:
     """The images are assets here. What each image of a zip is of is said by the words of its file name."""
@@ -150,7 +209,7 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
     "/{id}",
     summary="The bytes; or what they are, where `Accept` asks for JSON",
     response_class=Response,
-    responses=asset_answers.ASSET_FILE | answers.problems(404),
+    responses=ASSET_FILE | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
     """With `Accept: application/json` the answer to the upload again: kind, size, warnings, and the variants and

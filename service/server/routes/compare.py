@@ -27,9 +27,8 @@ from service.server.routes import answers, compare_answers, submission, waiting
 from service.server.routes.errors import GONE
 from service.server.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.server.verdict import comparison
-from service.server.verdict.comparison import Side, Source, Still, Taken, Verdict, ways_of
+from service.server.verdict.comparison import Side, Source, Still, Taken, UnderWay, Verdict, ways_of
 from service.server.verdict.evidence import PIXEL_BYTES, Estimate
-from service.server.verdict.under_way import UnderWay
 from service.system.executors import comparing, opening, packing, storing
 from service.views import MapKind
 

@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 
 from service.document import Scene, load_json, parse_scene
 from service.exports import FORMATS, material_format, material_scene, scene_format
-from service.server.routes import answers, exporting
+from service.server.routes import answers, export
 from service.server.state import app_state, caller_of, owner_of
 from service.server.storage.documents import (
     BY_LINK,
@@ -125,9 +125,9 @@ async def _exported(request: Request, kind: str, name: str, format: str) -> Resp
     data = await saving(partial(app_state(request).storage.documents.get, kind, name, owner_of(request)))
     if kind == "scenes":
         scene = await packing(partial(_scene, data), caller_of(request))
-        return await exporting.written(request, scene, wanted, wanted.scene_writer, "")
+        return await export.written(request, scene, wanted, wanted.scene_writer, "")
     scene, within = await packing(partial(material_scene, data, name), caller_of(request))
-    return await exporting.written(request, scene, wanted, wanted.material_writer, "", within)
+    return await export.written(request, scene, wanted, wanted.material_writer, "", within)
 
 
 def _scene(data: bytes) -> Scene:

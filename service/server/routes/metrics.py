@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from prometheus_client.core import Metric
 
     from service.server.state import AppState
-from service.server.operation.traffic import Traffic
+from service.server.http.request_log import Traffic
 
 MIME = "text/plain; version=0.0.4; charset=utf-8"
 PAGE = 4096  # bytes, of /proc/PID/statm

@@ -1,12 +1,17 @@
-"""Two sides become a verdict: groups of samples are taken while it is undecided, up to what their settings allow."""
+"""Two sides become a verdict: groups of samples are taken while it is undecided, up to what their settings allow. And
+which samples these are, and how far comparisons are while they are made.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -16,9 +21,7 @@ from service.document.quality import ResolvedSettings
 from service.server.verdict.decision import Decision, decide
 from service.server.verdict.evidence import Array, Estimate, Evidence, Sum
 from service.server.verdict.figures import Differing, Figures, differing, figures
-from service.server.verdict.maps import drawn
-from service.server.verdict.regions import Region, p_map, regions
-from service.server.verdict.schedule import USUAL_SAMPLES, Schedule, of_one_document, of_two_documents
+from service.server.verdict.regions import Region, drawn, p_map, regions
 from service.system.executors import comparing
 from service.views import MapKind
 
@@ -246,3 +249,92 @@ def _verdict(evidence: Evidence, decision: Decision, alpha: float) -> Verdict:
         different, decision.p_value, figures(a, b), differing(a, b, p, alpha), regions(p, alpha) if different else [],
         (evidence.a.samples, evidence.b.samples), p, a, b, alpha,
     )  # fmt: skip
+
+
+USUAL_SAMPLES = 256  # of each side whose settings have no `max_samples` but a time or a noise: as many as balanced's
+# Groups of so many samples at the least, up to MOST_GROUPS: many groups tell where single pixels differ, long ones
+# gain more from a low-discrepancy sampler.
+SAMPLES_OF_A_GROUP, MOST_GROUPS = 4, 16
+
+
+@dataclass(frozen=True)
+class Group:
+    seed: int
+    samples: int
+    look: bool  # whether the evidence is looked at after it
+
+
+@dataclass(frozen=True)
+class Schedule:
+    groups: list[Group]
+
+    @property
+    def looks(self) -> int:
+        return sum(group.look for group in self.groups)
+
+    def share(self, done: int) -> tuple[int, int]:
+        """The samples of so many groups, and those of all."""
+        samples = [group.samples for group in self.groups]
+        return sum(samples[:done]), sum(samples)
+
+
+def of_two_documents(samples: int, seed: int) -> Schedule:
+    """Equal groups for both sides, each with a seed of its own; looked at after 1, 2, 4 ... groups."""
+    groups = 1
+    while groups < MOST_GROUPS and samples >= 2 * groups * SAMPLES_OF_A_GROUP:
+        groups *= 2
+    seeds = seeds_from(seed)
+    return Schedule([Group(next(seeds), samples // groups, _is_power_of_two(k + 1)) for k in range(groups)])
+
+
+def of_one_document(samples: int, known: int, seed: int) -> Schedule:
+    """Groups for the one side that is a document, the other one being a picture of `known` samples with that seed:
+    first as many as the picture has, and as it has them, so that equal documents give equal bits; then twice as many
+    in all, and so on."""
+    seeds = seeds_from(seed)
+    groups, total = [Group(next(seeds), min(known, samples), True)], min(known, samples)
+    while total < samples:
+        more = min(total, samples - total)
+        groups.append(Group(next(seeds), more, True))
+        total += more
+    return Schedule(groups)
+
+
+def seeds_from(seed: int) -> Iterator[int]:
+    """The seed itself, and then others that are as good as independent; none twice."""
+    given = set[int]()
+    for k in count():
+        text = f"{seed} {k}".encode()
+        each = seed if k == 0 else int.from_bytes(hashlib.sha256(text).digest()[:4], "little")
+        if each not in given:
+            given.add(each)
+            yield each
+
+
+def _is_power_of_two(number: int) -> bool:
+    return number & (number - 1) == 0
+
+
+class UnderWay:
+    """The comparisons that are made, by owner and by the name that each was given. For the event loop alone."""
+
+    def __init__(self) -> None:
+        self._samples: dict[tuple[str, str], tuple[int, int]] = {}
+
+    @contextmanager
+    def told(self, owner: str, name: str | None) -> Iterator[Told]:
+        """What a comparison calls as it goes on. Without a name nobody asks; of two with one the later counts."""
+        key = (owner, name or "")
+
+        def tell(taken: int, most: int) -> None:
+            if name is not None:
+                self._samples[key] = taken, most
+
+        try:
+            yield tell
+        finally:
+            self._samples.pop(key, None)
+
+    def samples(self, owner: str, name: str) -> tuple[int, int] | None:
+        """Those of each pixel that are taken, and those that may be taken at most; None where none is under way."""
+        return self._samples.get((owner, name))

@@ -18,7 +18,7 @@ from service.renderers.local import keeper
 from service.renderers.local.supervisor import Supervisor
 from service.server.batches import queue as batch_queue
 from service.server.callbacks import queue as callback_queue
-from service.server.operation.loading import Loading
+from service.server.readiness import Loading
 from service.server.renders.recorder import Recorder
 from service.server.renders.render import Render
 from service.server.renders.slots import Slots

@@ -84,7 +84,7 @@ def test_nothing_else_gives_way() -> None:
     calls = ("os.nice(", "raise_thread_niceness(", "raise_process_niceness(", "setpriority(", "sched_setscheduler(")
     found = {path.relative_to(SERVICE).as_posix() for path in SERVICE.glob("**/*.py") if any_of(calls, path)}
     assert found == {
-        "system/priority.py",
+        "system/cpu.py",
         "system/executors.py",
         "system/confined/limits.py",
         "worker/__main__.py",

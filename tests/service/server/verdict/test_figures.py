@@ -7,8 +7,8 @@ import pytest
 
 from service.colorimetry import decode_srgb
 from service.server.verdict import figures as made
-from service.server.verdict.flip import flip
-from service.server.verdict.maps import drawn
+from service.server.verdict.figures import flip
+from service.server.verdict.regions import drawn
 
 
 def blurred(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:

@@ -6,7 +6,7 @@ from itertools import islice
 
 import pytest
 
-from service.server.verdict.schedule import of_one_document, of_two_documents, seeds_from
+from service.server.verdict.comparison import of_one_document, of_two_documents, seeds_from
 
 
 @pytest.mark.parametrize("samples", [1, 3, 8, 16, 100, 256, 5000])
