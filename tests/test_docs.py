@@ -1,13 +1,8 @@
-"""The pages that people read: links lead somewhere, all that is shipped is in the notices, modules are preloaded.
-
-What is written from the editor's modules is up to date.
-"""
+"""The pages that people read: links lead somewhere, all that is shipped is in the notices, modules are preloaded."""
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -56,16 +51,3 @@ def test_the_page_preloads_the_modules_that_it_begins_with() -> None:
     expected = sorted(needed - {"main.js"})
     lines = "\n".join(f'  <link rel="modulepreload" href="{path}">' for path in expected)
     assert listed == expected, f"the list in web/index.html has to be:\n{lines}"
-
-
-def test_the_notebook_has_the_modules_of_the_editor() -> None:
-    """client/src/sunbox/widget/ is written from web/: after a change there, run client/bundle.py."""
-    spec = importlib.util.spec_from_file_location("bundle", ROOT / "client" / "bundle.py")
-    assert spec and spec.loader
-    bundle = importlib.util.module_from_spec(spec)
-    sys.modules["bundle"] = bundle  # where dataclasses look
-    spec.loader.exec_module(bundle)
-    assert (bundle.TARGET / "widget.js").read_text() == bundle.bundle(), "run client/bundle.py"
-    assert (bundle.TARGET / "widget.css").read_text() == (ROOT / "web" / bundle.STYLE).read_text(), (
-        "run client/bundle.py"
-    )
