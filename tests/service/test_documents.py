@@ -95,7 +95,7 @@ def test_documents_survive_a_kill(saved: Documents, store: AssetStore, tmp_path:
     program = f"""
 import sys
 from pathlib import Path
-from service.formats import AssetStore
+from service.server.assets import AssetStore
 from service.server.storage.documents import Documents, checked
 folder = Path({str(tmp_path)!r})
 documents = Documents(folder, AssetStore(folder))

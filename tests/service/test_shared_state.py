@@ -18,12 +18,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from service.pack.edits.cache import CacheBudget, PackCache
-from service.system.turns import CALLER, Turns
 
 from service.formats.cache import ParsedCache
 from service.formats.source import digest
 from service.formats.types import AssetLimits, MeasuredData
+from service.pack.cache import CacheBudget, PackCache
 from service.server.assets.folder import AssetFolder
 from service.server.assets.integrity import Integrity
 from service.server.renders.scene import PackedScenes
@@ -37,6 +36,7 @@ from service.system.child_processes import Children
 from service.system.disk_usage import Usage
 from service.system.executors import Pool
 from service.system.memory import MemoryBudget
+from service.system.shares import CALLER, Turns
 from tests.service.rendering.stored import picture
 from tests.serving import wait_until
 

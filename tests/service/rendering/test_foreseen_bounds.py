@@ -18,7 +18,7 @@ from service.ipc.messages import Foresee
 from service.pack import pack
 from service.worker import foreseen
 from service.worker.device.loaded_scene import begin_key, slider_keys
-from service.worker.foreseen import BUDGET_S, LONGEST_S, ForeseenKernels
+from service.worker.foreseen import BUDGET_S, LONGEST_S, ForeseenKernels, has_power_to_spare
 from service.worker.helpers.compile_client import MOST, UsedKernels
 from tests.supervisors import SIZE, arrays_of
 
@@ -109,7 +109,7 @@ def test_power_to_spare(supplies: Any, spare: bool, tmp_path: Path, monkeypatch:
             (tmp_path / name / "online").write_text(f"{online}\n")
     monkeypatch.setattr(foreseen, "SUPPLIES", tmp_path)
     monkeypatch.setattr(foreseen, "QUOTA", tmp_path / "none")
-    assert foreseen.has_power_to_spare() == spare
+    assert has_power_to_spare() == spare
 
 
 @pytest.mark.parametrize(("quota", "spare"), [("max 100000", True), ("150000 100000", True), ("50000 100000", False)])
@@ -119,7 +119,7 @@ def test_a_part_of_a_processor_is_nothing_to_spare(
     (tmp_path / "cpu.max").write_text(f"{quota}\n")
     monkeypatch.setattr(foreseen, "SUPPLIES", tmp_path / "none")
     monkeypatch.setattr(foreseen, "QUOTA", tmp_path / "cpu.max")
-    assert foreseen.has_power_to_spare() == spare
+    assert has_power_to_spare() == spare
 
 
 def test_a_record_keeps_the_latest_kernels_over_a_restart(tmp_path: Path) -> None:

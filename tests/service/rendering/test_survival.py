@@ -138,7 +138,7 @@ def test_who_rests_makes_room(mortal: Server) -> None:
 def test_a_server_that_is_told_again_ends_at_once(tmp_path: Path) -> None:
     """At a signal that comes a second after the first."""
     program = (
-        "import time; from service import app\n"
+        "import time; from service.server import app\n"
         "server = app._Server(app.uvicorn.Config(None), None)\n"
         "server._end(); server._end(); print('told', flush=True)\n"
         "time.sleep(app.AGAIN_S + 0.1); server._end(); print('went on')\n"
