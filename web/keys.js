@@ -30,7 +30,7 @@ class Flight {
   }
 
   lift(key) {
-    if (this.#held.delete(key) && !this.#held.size) this.move.rest();
+    if (this.#held.delete(key) && !this.#held.size) this.move.endGesture();
   }
 
   stop() {
@@ -92,7 +92,7 @@ export function watchKeys(move, acts) {
   document.addEventListener("keyup", (event) => {
     const key = event.key.toLowerCase();
     flight.lift(key);
-    if (ARROWS[key] || LIFTS[key] || "+=-_".includes(key)) move.rest();
+    if (ARROWS[key] || LIFTS[key] || "+=-_".includes(key)) move.endGesture();
   });
   window.addEventListener("blur", () => flight.stop());
 }

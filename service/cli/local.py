@@ -22,7 +22,7 @@ from service.cli.tracing import Interrupt, Tracing
 from service.config import Config, load_config
 from service.displays import SRGB
 from service.document import parse_scene, parse_settings
-from service.document.look import shown_as
+from service.document.grading import shown_as
 from service.document.quality import resolve
 from service.document.validation import both, validated
 from service.formats import images

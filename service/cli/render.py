@@ -143,7 +143,7 @@ def _view(
     arguments: argparse.Namespace, format: str, exposure: float | None, before: PictureView | None
 ) -> PictureView:
     """The view as given; the rest comes from the picture that is made again, if it is one."""
-    from service.document.look import shown_as
+    from service.document.grading import shown_as
     from service.formats.images.recipe import PictureView
 
     options = {

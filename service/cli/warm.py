@@ -31,13 +31,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     began = time.monotonic()
 
-    def told(done: int, of: int) -> None:
+    def on_progress(done: int, of: int) -> None:
         print(f"{done} of {of} kernels, {time.monotonic() - began:.0f} s", file=sys.stderr)
 
     keys = wanted(list(foreseen(named, config)))
     device = int(config.devices[0]) if config.devices and not config.software_renderers else config.device
     try:
-        driver = warm(keys, device, config.software_renderers > 0, arguments.jobs or cores(), told)
+        driver = warm(keys, device, config.software_renderers > 0, arguments.jobs or cores(), on_progress)
     except BrokenProcessPool:
         raise Failed("a process that compiles has ended; perhaps the machine's memory has run out") from None
     except NotKept:

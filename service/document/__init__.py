@@ -11,9 +11,9 @@ color           colours: linear, sRGB, by temperature
 photometry      strengths in candela, lumen, lux and nit
 validation      what pydantic says, as errors with pointers
 text            JSON texts: parsed, weighed and bounded; merge patches
+grading         the tone map and the colour space by which a picture is shown
 axes            what varies from one render of a batch to the next
 references      the assets that a document refers to
-look            the tone map and the colour space by which a picture is shown
 schema          the schema that editors are made from, and a model of it in few words
 quality         quality presets, and settings with every knob resolved
 presets         built-in scenes, materials and environments

@@ -24,7 +24,8 @@ INLINE = 32 * 1024  # bytes of a pickle; a longer one goes to memory: a datagram
 ALIGNMENT = 64  # a cache line, and more than any dtype asks for
 RECEIVED = 2 * INLINE
 DESCRIPTOR = struct.Struct("i")
-# A sender that is not trusted must not change or shorten what was looked at: a file that shrinks kills who maps it.
+# A sender that is not trusted must not change or shorten memory that was checked: mapping a truncated file raises
+# SIGBUS.
 SEALS = fcntl.F_SEAL_SEAL | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE
 MOST = 8  # descriptors that go with a datagram
 ROOM = socket.CMSG_SPACE(MOST * DESCRIPTOR.size)

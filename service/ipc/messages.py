@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
-from service.ipc.task_control import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.ipc.task_control import ApplyNow, CheckpointStored, Drop, Hold, Pause, Resume, Stop, TakeCheckpoint
 from service.views import DEFAULT_TONE_MAP, Encoding
 
 BsdfQuestion = Literal["values", "albedo", "terms"]
@@ -95,7 +95,7 @@ class SavedPicture:
     samples: int
     under_way: tuple[int, int, int]  # samples of the pass, row and column of its next tile
     buffers: list[np.ndarray]
-    driver: str = ""  # whose bits these are: only with an equal one they are gone on with; "": nobody knows
+    driver: str = ""  # that produced the samples; only the same driver may resume. "": not known
     # Bands that were done of blocks that were not merged yet: first sample, number of samples, first row, number of
     # rows. Their values are the last ones of `buffers`.
     bands: tuple[tuple[int, int, int, int], ...] = ()
@@ -368,7 +368,7 @@ ToRenderer = (
     | Hold
     | Stop
     | Drop
-    | Settle
+    | ApplyNow
     | TakeCheckpoint
     | CheckpointStored
     | Restore

@@ -54,7 +54,7 @@ class CheckpointStored:
 
 
 @dataclass(frozen=True)
-class Settle:
+class ApplyNow:
     """Asks to apply the updates so far before the next one, which may be too much and fall back to them."""
 
     task: int

@@ -26,7 +26,7 @@ from service.ipc.messages import (
     Update,
     Want,
 )
-from service.ipc.task_control import Pause, Resume, Settle, Stop
+from service.ipc.task_control import ApplyNow, Pause, Resume, Stop
 from service.renderers.working_states import WorkingStates
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
@@ -132,7 +132,7 @@ class ReplayLog:
         out: list[Encoded | ToRenderer] = []
         for number, (_, state) in enumerate(self._states.items()):
             if number:  # joined with the one before, that would be lost with it
-                out.append(Settle(self._task))
+                out.append(ApplyNow(self._task))
             out.append(channel.another(state.scene))
             if state.since is not None:
                 out.append(state.since)

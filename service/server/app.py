@@ -179,7 +179,7 @@ class _Server(uvicorn.Server):
     async def on_tick(self, counter: int) -> bool:
         if counter % TICKS == 0:
             with reported("watch of connections"):
-                self._watch.look(self.server_state.connections)
+                self._watch.check(self.server_state.connections)
         if self._state.loading.failed:
             self.refused = self.should_exit = True
         return await super().on_tick(counter)

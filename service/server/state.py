@@ -88,7 +88,7 @@ class AppState:
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
         self.batches = BatchQueue(self.render_queue, self._members, self._ended, self.config.max_running + 1)
-        self.callbacks = Callbacks(self.config, self._told_of)
+        self.callbacks = Callbacks(self.config, self._ended_work)
         self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
         self.downloads = Downloads(self.config.data_dir, self.memory)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu, self.downloads)
@@ -103,7 +103,7 @@ class AppState:
         return {
             "version": metadata.version("sunbox-server"),
             "renderer": renderer,
-            "renderers": [_told(each) for each in self.renderers.members],
+            "renderers": [_as_json(each) for each in self.renderers.members],
             "sandbox": asdict(await asyncio.to_thread(self.storage.assets.rights)),
             "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
@@ -146,7 +146,7 @@ class AppState:
         outcome = Outcome(warnings=list(packed.warnings) if packed is not None else [])
         return self._job(order, document, packed, outcome)
 
-    def _told_of(self, kind: CallbackKind, id: str, owner: str) -> Render | Batch:
+    def _ended_work(self, kind: CallbackKind, id: str, owner: str) -> Render | Batch:
         """Whose end a callback is about. Raises NotFound, Gone."""
         return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
@@ -206,7 +206,7 @@ class AppState:
             await asyncio.sleep(0.01)
 
 
-def _told(member: Member) -> dict[str, str | None]:
+def _as_json(member: Member) -> dict[str, str | None]:
     return {**asdict(member.place), "vendor": member.vendor, "driver": member.driver, "state": member.state}
 
 

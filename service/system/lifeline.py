@@ -19,8 +19,8 @@ def end_with(parent: int) -> bool:
 
 def end_with_pipe(descriptor: int) -> bool:
     """Has the kernel end this process with whoever holds the pipe's other end; False when nobody does."""
-    # Opened anew: one description, which children share, has one owner to signal. SIGIO ends who does not handle it,
-    # in the middle of a driver's compiler too.
+    # Opened anew: one description, which children share, has one owner to signal. SIGIO ends a process that
+    # does not handle it, in the middle of a driver's compiler too.
     own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
     fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
     fcntl.fcntl(own, fcntl.F_SETFL, fcntl.fcntl(own, fcntl.F_GETFL) | os.O_ASYNC)

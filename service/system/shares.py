@@ -19,8 +19,8 @@ RETRY_S = 5
 CALLER: ContextVar[str] = ContextVar("CALLER", default="")
 
 
-class Turns:
-    """At most `most` threads at a time, all but one of them for the same caller: `with turns.one():` waits.
+class FairSemaphore:
+    """Admits at most `most` threads at a time, all but one of them for the same caller: `with turns.one():` waits.
 
     The next turn is that of the caller with the fewest, then of the thread that has waited longest.
     """

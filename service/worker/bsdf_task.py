@@ -53,7 +53,7 @@ class BsdfTask:
         answer = self._steps.step()
         if not self._begun:
             self._begun = True
-            self._wait.met(self._key)
+            self._wait.loaded(self._key)
         if answer is not None:
             self._ended = True
             self._send(Evaluated(self.number, vars(answer)))

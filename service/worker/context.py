@@ -8,7 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from service.ipc.messages import FromRenderer
-from service.worker.device.memory import UNLIMITED, Memory
+from service.worker.device.memory import UNLIMITED, DeviceMemory
 from service.worker.helpers.compile_client import CompileClient
 from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.helpers.first_look_client import FirstLookClient
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from gpu import Renderer
 
 
-def _unlimited() -> Memory:
-    return Memory(UNLIMITED, list)
+def _unlimited() -> DeviceMemory:
+    return DeviceMemory(UNLIMITED, list)
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class WorkerContext:
     denoiser: DenoiseClient
     compiler: CompileClient | None = None  # None: kernels are compiled in the task's own turn
     first_looks: FirstLookClient | None = None  # None: what waits for its kernel is shown by superset kernels alone
-    memory: Memory = field(default_factory=_unlimited)
+    memory: DeviceMemory = field(default_factory=_unlimited)
     # Lets go of a task, by its number: the server keeps the pictures of renders and can bring them back. With it Done
     # and a Checkpoint every `checkpoint_s` seconds bring the picture of a render to the server.
     forget: Callable[[int], None] | None = None

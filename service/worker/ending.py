@@ -88,7 +88,7 @@ class Ending:
         residency.wake()
         tracker.clock.pause()
         tracker.reason = reason
-        residency.rests()
+        residency.touch()
         if residency.loaded is not None:
             noise = tracker.meter.read(residency.full, fresh=True)
             wanted = frames.denoising.covers("color", noise) and frames.scale == 1.0 and reason != "stopped"

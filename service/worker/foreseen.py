@@ -30,7 +30,7 @@ LONGEST_S = 10.0  # that one kernel takes: none is begun for which less is left
 SUPPLIES = Path("/sys/class/power_supply")  # Linux' power supply class
 QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a control group, version 2: microseconds of a processor, of how many
 
-Told = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 
 _compiling: list[Precompiler] = []  # the one of a process that compiles
 
@@ -117,9 +117,9 @@ def _wanted(foreseen: Sequence[Foresee]) -> Iterator[KernelKey]:
     yield from kernel_keys.bsdf_keys()
 
 
-def warm(keys: Sequence[KernelKey], device: int | None, software: bool, jobs: int, told: Told) -> str:
-    """Compile what is not compiled yet, in so many processes; `told` is called with how many are done and how many
-    there are. Returns the driver's name and version.
+def warm(keys: Sequence[KernelKey], device: int | None, software: bool, jobs: int, on_progress: OnProgress) -> str:
+    """Compile what is not compiled yet, in so many processes; `on_progress` is called with how many are done and how
+    many there are. Returns the driver's name and version.
 
     Raises GpuError, BrokenProcessPool, NotKept, OSError."""
     device = software_device() if software else device
@@ -135,7 +135,7 @@ def warm(keys: Sequence[KernelKey], device: int | None, software: bool, jobs: in
 
     missing = [key for key in keys if not is_there(key)]
     done = len(keys) - len(missing)
-    told(done, len(keys))
+    on_progress(done, len(keys))
     records().mkdir(parents=True, exist_ok=True)
     # Processes and not threads: LLVM compiles a kernel in one thread, and a context belongs to one.
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _begin, (device,)) as pool:
@@ -146,7 +146,7 @@ def warm(keys: Sequence[KernelKey], device: int | None, software: bool, jobs: in
                     raise NotKept
                 record(work[future]).touch()
                 done += 1
-                told(done, len(keys))
+                on_progress(done, len(keys))
         finally:
             pool.shutdown(cancel_futures=True)
     return driver

@@ -30,10 +30,10 @@ from service.ipc.messages import (
     Usage,
     Want,
 )
-from service.ipc.task_control import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.ipc.task_control import ApplyNow, CheckpointStored, Drop, Hold, Pause, Resume, Stop, TakeCheckpoint
 from service.worker.bsdf_task import BsdfTask
 from service.worker.context import WorkerContext
-from service.worker.device.memory import Memory
+from service.worker.device.memory import DeviceMemory
 from service.worker.division.assistant import Assistant
 from service.worker.foreseen import ForeseenKernels
 from service.worker.helpers.compile_client import CompileClient, compiler_memory
@@ -42,7 +42,7 @@ from service.worker.helpers.first_look_client import FirstLookClient
 from service.worker.scheduler import Scheduler
 from service.worker.task import Task
 
-Turns = Task | Assistant | BsdfTask  # what has turns
+Runnable = Task | Assistant | BsdfTask  # what the scheduler gives turns to
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
 # No hang: a driver may take this long for a kernel with every feature. The renderer compiles none where a process
@@ -72,7 +72,7 @@ class Loop:
         self._tasks: dict[int, Task] = {}
         self._questions: dict[int, BsdfTask] = {}
         self._assistants: dict[int, Assistant] = {}  # of tasks whose home is elsewhere
-        self._memory = Memory(
+        self._memory = DeviceMemory(
             memory_limit,
             lambda: [*self._tasks.values(), *self._assistants.values()],
             lambda: renderer.shared_bytes,
@@ -123,7 +123,7 @@ class Loop:
             self._work(chosen, chosen.turn)
             self._heartbeat.lasted(time.monotonic() - began)
         for task in list(self._tasks.values()):
-            for message in task.settled():
+            for message in task.take_deferred():
                 self._take(message)
             if task.wanted:
                 self._work(task, partial(self._answer, task))
@@ -135,7 +135,7 @@ class Loop:
         self._send(Ready({"denoiser": denoise.version(place)}))
 
     @property
-    def _everyone(self) -> list[Turns]:
+    def _everyone(self) -> list[Runnable]:
         return [*self._tasks.values(), *self._assistants.values(), *self._questions.values()]
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
@@ -165,7 +165,7 @@ class Loop:
         if task.answer():
             self._scheduler.shown(task)
 
-    def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
+    def _work(self, task: Runnable, work: Callable[[], object], read: Read | None = None) -> None:
         """Do the work and charge the task's client for its time. An exception fails this task only."""
         began = time.perf_counter()
         compiles = task.loads or not self._compiler.able
@@ -210,9 +210,9 @@ class Loop:
             Assistants: work(lambda task, message: task.picture.home.assist(message.ids)),
             LeaseDone: work(lambda task, message: task.picture.home.heard(message)),
             Restore: work(lambda task, message: task.picture.restore(message)),
-            Settle: note(lambda task, _: None),  # nothing is left to be applied: else the task had kept it
+            ApplyNow: note(lambda task, _: None),  # nothing is left to be applied: else the task had kept it
             Stop: work(lambda task, _: task.picture.stop()),
-            Want: note(lambda task, message: task.picture.look(message)),
+            Want: note(lambda task, message: task.picture.request_frame(message)),
             TakeCheckpoint: note(lambda task, _: task.picture.ending.checkpoints.hasten()),
             CheckpointStored: note(lambda task, message: task.picture.ending.checkpoints.stored(message.took_s)),
             Pause: note(lambda task, message: task.pause(message.away)),
@@ -281,7 +281,7 @@ class Loop:
         task.release()
         self._renderer.let_go()
 
-    def _guard(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
+    def _guard(self, task: Runnable, work: Callable[[], object], read: Read | None = None) -> None:
         try:
             work()
             return

@@ -111,8 +111,8 @@ class Scheduler:
         self._seen[task] = Seen(self._all_s, self._accounts[task.client].used_s, task.account.used_s)
 
     def _late_s(self, task: Turn, within: bool = False) -> float:
-        """How long it has waited for its next frame; 0 where that is not long, or where its client, or `within` its
-        client the task, has had so much since that others go first."""
+        """Seconds that a task has waited for its next frame; 0 where these are few, and 0 once its client's share
+        since the last frame is used up (`within` the client: the task's share)."""
         seen = self._seen.get(task)
         if seen is None or not task.wanted:
             return 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from service.ipc.messages import Restore, ToRenderer, Update
-from service.ipc.task_control import Drop, Settle
+from service.ipc.task_control import ApplyNow, Drop
 from service.worker.context import WorkerContext
 from service.worker.scheduler import Account
 from service.worker.task_picture import Phase, TaskPicture
@@ -85,7 +85,7 @@ class Task:
     def bytes(self) -> int:
         """The bytes that it takes on the device."""
         picture = self.picture
-        return picture.residency.bytes + picture.updates.bytes + picture.under_hand.bytes
+        return picture.residency.bytes + picture.updates.bytes + picture.prior.bytes
 
     @property
     def rested_since(self) -> float:
@@ -101,12 +101,12 @@ class Task:
         compiled first: one that asks for that, and those behind it, but for the last."""
         if isinstance(message, Drop):
             return False
-        waits = isinstance(message, Settle | Restore) and self.picture.updates.pending is not None
+        waits = isinstance(message, ApplyNow | Restore) and self.picture.updates.pending is not None
         if waits or self._later:
             self._later.append(message)
         return bool(self._later)
 
-    def settled(self) -> list[ToRenderer]:
+    def take_deferred(self) -> list[ToRenderer]:
         """The messages that were deferred, in order, once the pending update is applied."""
         if not self._later or self.picture.updates.pending is not None:
             return []
@@ -115,7 +115,7 @@ class Task:
 
     def turn(self) -> None:
         """Do the next step of the picture."""
-        self.picture.step(self._paused, settles=bool(self._later))
+        self.picture.step(self._paused, only_applies=bool(self._later))
 
     def answer(self) -> bool:
         """Send the frame that is wanted, if it would show something new."""

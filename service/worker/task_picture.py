@@ -10,7 +10,7 @@ from gpu import GpuError, OutOfMemory, RenderSettings, SceneTooLarge
 from service.ipc.leases import undivided
 from service.ipc.messages import Discarded, Failed, Loaded, Restore, Update, Want, driver_of
 from service.worker.context import WorkerContext
-from service.worker.device.memory import Holder
+from service.worker.device.memory import Evictable
 from service.worker.device.residency import Residency
 from service.worker.device.resolution_ladder import FULL_S
 from service.worker.division.home import Home
@@ -20,7 +20,7 @@ from service.worker.progress import ProgressTracker
 from service.worker.updates import Updates
 from service.worker.view.denoise_policy import DenoisePolicy
 from service.worker.view.frames import SLICE_S, FrameSource
-from service.worker.view.prior import UnderHand
+from service.worker.view.prior import PriorGuess
 
 WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 
@@ -42,7 +42,7 @@ class TaskPicture:
     """Joins the owners of what a picture is made of: the update that waits, the device's memory, progress, frames,
     the division among renderers, and the end. A step is done whenever the task has a turn."""
 
-    def __init__(self, context: WorkerContext, number: int, client: str, holder: Holder) -> None:
+    def __init__(self, context: WorkerContext, number: int, client: str, holder: Evictable) -> None:
         """`holder`: the task, through which other tasks evict the picture from the device."""
         self.attempted = 0  # the generation of the last update
         self.traced = 0  # samples of pixels
@@ -52,8 +52,8 @@ class TaskPicture:
         self.residency = Residency(renderer, context.memory, holder, self._part)
         self.tracker = ProgressTracker()
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
-        self.under_hand = UnderHand(renderer, self.residency.make_room)
-        shown = denoising, self.under_hand
+        self.prior = PriorGuess(renderer, self.residency.make_room)
+        shown = denoising, self.prior
         self.frames = FrameSource(context, number, client, self.residency, self.tracker, *shown, self._finish)
         self.home = Home(number, context.send)
         self.ending = Ending(context, number, self.residency, self.tracker, self.frames, self.answer, self.home.bands)
@@ -91,10 +91,10 @@ class TaskPicture:
         """Whether the next step may take as long as a compilation does."""
         return self.phase in (Phase.COMPILING, Phase.UPDATING)
 
-    def step(self, paused: bool, settles: bool = False) -> None:
+    def step(self, paused: bool, only_applies: bool = False) -> None:
         """Apply updates, trace a slice, and end the render when that was the last. While `paused`, only a first look
-        at what is new is traced. With `settles` an update is applied and nothing traced, as messages wait behind it,
-        such as the picture to go on with."""
+        at what is new is traced. With `only_applies` an update is applied and nothing traced, as messages wait behind
+        it, such as the picture to go on with."""
         pending = self.updates.pending
         if self.phase is Phase.COMPILING:
             self.traced += self.updates.trace_preview()
@@ -104,7 +104,7 @@ class TaskPicture:
             if self.updates.begin_to_wait(pending, paused):
                 return
             self._apply(pending)
-            if settles:
+            if only_applies:
                 return
         if self.updates.stops:
             self.stop()
@@ -116,17 +116,17 @@ class TaskPicture:
             return
         if not self.ending.end_if_reached():
             self._trace(paused)
-        residency.rests()
+        residency.touch()
 
     def _trace(self, paused: bool) -> None:
         residency, tracker, scale = self.residency, self.tracker, self._scale
-        lacking = self.under_hand.lacks(residency.ladder, tracker.pixel_s) if tracker.interactive else None
+        lacking = self.prior.lacks(residency.ladder, tracker.pixel_s) if tracker.interactive else None
         if scale == 1.0 and lacking is not None:
             residency.insist(lambda: residency.ladder.picture(lacking).trace(FULL_S, 1))
             return
-        if scale == 1.0 and tracker.interactive and self.under_hand.lacks_depth(residency.full):
+        if scale == 1.0 and tracker.interactive and self.prior.lacks_depth(residency.full):
             traced = self.frames.trace_first_hit(residency.full)
-            self.under_hand.has_depth = traced is True
+            self.prior.has_depth = traced is True
             if traced is not None:
                 return
         picture = residency.ladder.picture(scale)
@@ -223,9 +223,9 @@ class TaskPicture:
         """Keep the picture that is about to be edited, as a guess at the next one; or none, where that is another."""
         residency, latest = self.residency, self.frames.denoising.latest
         if update.scene is not None or update.settings is not None:
-            self.under_hand.release()
+            self.prior.release()
         elif update.restarts and self.tracker.interactive and residency.loaded is not None:
-            self.under_hand.keep(residency.ladder, latest.pixels if latest and latest.scale == 1.0 else None)
+            self.prior.keep(residency.ladder, latest.pixels if latest and latest.scale == 1.0 else None)
 
     def evict(self) -> None:
         """Leave the device: for the machine's memory, or for good where the server has the picture already."""
@@ -256,11 +256,11 @@ class TaskPicture:
         tracker.even = not saved.under_way[0]
         self.ending.checkpoints.restart()
 
-    def look(self, want: Want) -> None:
+    def request_frame(self, want: Want) -> None:
         """Note which frame is wanted; `answer` sends it."""
         # Who looks at the first hits has more samples of them traced than a guess needs.
-        self.under_hand.wanted = want.view.prior and want.view.aov == "color"
-        self.frames.denoising.look(want.view)
+        self.prior.wanted = want.view.prior and want.view.aov == "color"
+        self.frames.denoising.set_view(want.view)
         self.frames.want = want
 
     def answer(self) -> bool:
@@ -304,13 +304,13 @@ class TaskPicture:
 
     def _part(self) -> None:
         """Have all helpers let go of resources that are about to leave the device."""
-        self.under_hand.release()
+        self.prior.release()
         self.frames.part()
 
     def _restart(self) -> None:
         """Begin a picture without samples, at a scale that can be shown soon where a person looks on."""
         self.frames.restart()
-        self.under_hand.restart()
+        self.prior.restart()
         self.tracker.restart()
         self.home.restart()
         first = self.residency.loaded is not None and self.tracker.interactive

@@ -113,7 +113,7 @@ class Updates:
     def _waits_for(self, key: KernelKey, request: KernelRequest, generation: int, watched: bool) -> bool:
         """Whether this kernel is being compiled, which may be shown by another one meanwhile."""
         assert self._wait.compiler is not None
-        shows = watched and not self._wait.compiler.knows(key)
+        shows = watched and not self._wait.compiler.needs_no_wait(key)
         at_once = shows and self._fallback.can(request)
         soon = shows and not at_once and self._unoptimised.can(request)
         if not self._wait.begin(key):
@@ -130,7 +130,7 @@ class Updates:
         self._release_previews()
         if self._request is not None and self._tracker.generation == update.generation:
             for key in self._request.keys:
-                self._wait.met(key)
+                self._wait.loaded(key)
         self._edited = self._request = self._refusal = None
 
     def take_compile_ms(self) -> float:

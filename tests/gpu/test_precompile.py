@@ -217,7 +217,7 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
         compiler.prepare(common_keys(), "soon")
         while compiler.left_s is not None:
             compiler.hear()
-        assert all(compiler.has(key) for key in common_keys())
+        assert all(compiler.on_disk(key) for key in common_keys())
         asked.append(helper.asked)
     assert asked == [common_keys(), []] and len(common_keys()) == 26
 

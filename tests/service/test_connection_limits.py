@@ -47,7 +47,7 @@ class _Server(uvicorn.Server):
     watch = Watch()
 
     async def on_tick(self, counter: int) -> bool:
-        self.watch.look(self.server_state.connections)
+        self.watch.check(self.server_state.connections)
         return await super().on_tick(counter)
 
 
@@ -196,7 +196,7 @@ def test_a_frame_goes_on() -> None:
         for _ in range(3):
             for connection in (stream, download):
                 connection.read += int(least)
-            watch.look([stream, download])
+            watch.check([stream, download])
             now += 0.9 * connection_limits.UNREAD_S
         assert stream.ended and not download.ended
 

@@ -21,7 +21,7 @@ NO_SERVER = ("bench", "cli")
 OF_FILES = ("formats", "document", "server/assets", "server/verdict")
 BOUNDING = {
     "BoundedSemaphore", "Children", "ClientExecutor", "Limit", "Pool", "ProcessPoolExecutor", "Queue", "Room",
-    "Semaphore", "Shares", "ThreadPoolExecutor", "Turns", "_Room", "run_in_executor", "to_thread",
+    "Semaphore", "Shares", "ThreadPoolExecutor", "FairSemaphore", "Turns", "_Room", "run_in_executor", "to_thread",
 }  # fmt: skip
 BOUNDS = re.compile(
     r"AT_ONCE|(^|_)EACH$|^MOST$|OF_ONE|OPEN_OF|WAITS$|WAITING$|TOGETHER$|QUEUED$|REFUSALS|^ROOM$|LASTING$|FEW"
@@ -41,7 +41,7 @@ RAY = "carries all that a renderer is sent; of that turns go round clients"
 CODE = {
     "server/app.py to_thread": OWN,
     "formats/sandbox/sandbox.py self.children = Children": "one for each turn",
-    "formats/sandbox/sandbox.py self._turns = Turns": "all but one for one caller, the one with fewest first",
+    "formats/sandbox/sandbox.py self._turns = FairSemaphore": "all but one for one caller, the one with fewest first",
     "server/app.py state = Pool": "renderers, whose time is divided among clients by the scheduler",
     "server/callbacks/queue.py AT_ONCE": SHARES,
     "server/callbacks/queue.py shares = Shares": SHARES,

@@ -175,7 +175,7 @@ def start(width: int, generation: int) -> protocol.Start:
 
 def edit(session: EditSession, message: protocol.Start) -> None:
     session.take(message)
-    session.settle()
+    session.pack_pending()
 
 
 def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:

@@ -36,7 +36,7 @@ from service.system.child_processes import Children
 from service.system.disk_usage import Usage
 from service.system.executors import Pool
 from service.system.memory import MemoryBudget
-from service.system.shares import CALLER, Turns
+from service.system.shares import CALLER, FairSemaphore
 from tests.service.rendering.stored import picture
 from tests.serving import wait_until
 
@@ -296,7 +296,7 @@ def _budget(folder: Path) -> Hammer:
 
 
 def _turns(folder: Path) -> Hammer:
-    turns, inside = Turns(3), list[int]()
+    turns, inside = FairSemaphore(3), list[int]()
 
     def turn(i: int) -> None:
         CALLER.set(f"caller {i % 2}")
@@ -365,7 +365,7 @@ HAMMERS: dict[str, Callable[[Path], Hammer]] = {
     "AssetShares": _asset_shares,
     "Children": _children,
     "MemoryBudget": _budget,
-    "Turns": _turns,
+    "FairSemaphore": _turns,
     "Pool": _pool,
     "system/garbage.py": _garbage,
     "system/background.py": _deaths,

@@ -1,10 +1,10 @@
-"""Turns of threads go round the callers that they work for."""
+"""FairSemaphore of threads go round the callers that they work for."""
 
 from __future__ import annotations
 
 import threading
 
-from service.system.shares import CALLER, Turns
+from service.system.shares import CALLER, FairSemaphore
 
 PATIENCE_S = 30.0
 
@@ -12,7 +12,7 @@ PATIENCE_S = 30.0
 class Worker:
     """A thread that takes a turn for a caller, and has it until `end`."""
 
-    def __init__(self, turns: Turns, caller: str) -> None:
+    def __init__(self, turns: FairSemaphore, caller: str) -> None:
         self._turns, self._caller = turns, caller
         self.has_turn, self._ended = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._work)
@@ -30,7 +30,7 @@ class Worker:
 
 
 def test_one_caller_leaves_a_turn_for_others() -> None:
-    turns = Turns(3)
+    turns = FairSemaphore(3)
     crowd = [Worker(turns, "crowd") for _ in range(5)]
     other = Worker(turns, "other")
     assert other.has_turn.wait(PATIENCE_S), "the crowd has all"
@@ -44,7 +44,7 @@ def test_one_caller_leaves_a_turn_for_others() -> None:
 
 
 def test_with_one_turn_they_come_one_after_the_other() -> None:
-    turns, most, now = Turns(1), [0], [0]
+    turns, most, now = FairSemaphore(1), [0], [0]
     lock = threading.Lock()
 
     def work() -> None:

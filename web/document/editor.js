@@ -73,7 +73,7 @@ export class Editor extends Store {
       zoom: move(moving.zoom),
       fly: move(moving.fly),
       turn: (share) => this.#turnEnvironment(share),
-      rest: () => this.seal(),
+      endGesture: () => this.seal(),
     };
   }
 
@@ -137,7 +137,7 @@ export class Editor extends Store {
     this.edit(place, { ...material, [name]: value, ...Object.fromEntries(begun) });
   }
 
-  rest() {
+  endGesture() {
     this.seal();
   }
 

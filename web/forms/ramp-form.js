@@ -57,7 +57,7 @@ export class RampForm {
 
   #give(name, value) {
     this.acts.edit(`${this.place}/${name}`, value);
-    this.acts.rest();
+    this.acts.endGesture();
   }
 
   #choose(value) {

@@ -85,7 +85,7 @@ export class TextureForm {
         if (isProjected) this.acts.edit(place, { ...lying, mapping: value }, `${place}/mapping`);
         else this.acts.edit(`${place}/${name}`, value);
       },
-      commit: () => this.acts.rest(),
+      commit: () => this.acts.endGesture(),
       forgive: () => this.acts.forgive(),
     });
     return { place, ...form };

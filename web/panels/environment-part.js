@@ -26,7 +26,7 @@ export class EnvironmentPart {
       title: "Drag to turn the environment; with Ctrl by 15°",
       onkeydown: (event) => this.#step(event),
       onkeyup: ({ key }) => {
-        if (STEPS[key]) acts.rest();
+        if (STEPS[key]) acts.endGesture();
       },
     });
     root.append(this.canvas, this.ring);
@@ -61,7 +61,7 @@ export class EnvironmentPart {
       },
       end: (isCancelled) => {
         if (isCancelled) this.acts.edit(PLACE, before);
-        this.acts.rest();
+        this.acts.endGesture();
       },
     };
   }

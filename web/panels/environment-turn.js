@@ -29,7 +29,7 @@ export class EnvironmentTurn {
     const own = fields(this.schema, environmentModels(this.schema)[type]).filter(({ name }) => name === NAME);
     this.form = schemaForm(own, {
       change: (name, value) => this.acts.edit(`/scene/environment/${name}`, value),
-      commit: () => this.acts.rest(),
+      commit: () => this.acts.endGesture(),
       forgive: () => this.acts.forgive(),
     });
     this.root.replaceChildren(this.form.element);

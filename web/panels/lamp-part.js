@@ -106,7 +106,7 @@ export class LampPart {
       change: (name, value) => this.#change(name, value),
       commit: () => {
         this.#held = null;
-        this.acts.rest();
+        this.acts.endGesture();
       },
       forgive: () => this.acts.forgive(),
     });

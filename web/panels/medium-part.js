@@ -34,7 +34,7 @@ export class MediumPart {
     const { scene } = this.acts.state;
     const shape = this.thing === "/environment" ? null : at(scene, this.thing);
     this.acts.edit(`/scene${this.#place}`, turned(at(scene, this.#place), way, scene, shape));
-    this.acts.rest();
+    this.acts.endGesture();
   }
 
   // `thing`: what is selected, with its model `owner` of the schema; null where that has no medium.
@@ -64,7 +64,7 @@ export class MediumPart {
             chosen.map((field) => ({ ...field, required: field.required || WAYS[way].includes(field.name) })),
             {
               change: (name, value) => this.acts.edit(`/scene${this.#place}/${name}`, value),
-              commit: () => this.acts.rest(),
+              commit: () => this.acts.endGesture(),
               forgive: () => this.acts.forgive(),
             },
           );

@@ -72,7 +72,7 @@ export class Panel {
     const textures = [];
     const form = schemaForm(chosen, {
       change: (name, value) => this.#edit(chosen, place, name, value),
-      commit: () => this.acts.rest(),
+      commit: () => this.acts.endGesture(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.stage.takeTexture(`${place}/${name}`, file),
       pickFile: ({ file }) => this.stage.replaceFile(file),

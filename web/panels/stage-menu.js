@@ -30,7 +30,7 @@ export class StageMenu {
           this.#paint.place,
           linear(this.color.value).map((x) => Number(x.toPrecision(4))),
         ),
-      onchange: () => acts.rest(),
+      onchange: () => acts.endGesture(),
     });
     this.colorRow = element(
       "div",

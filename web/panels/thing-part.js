@@ -157,7 +157,7 @@ export class ThingPart {
     if (isShape) parts.push(this.#transform(document));
     this.#forms = parts.map(({ fields: chosen, change, ...part }) => ({
       ...part,
-      form: schemaForm(chosen, { change, commit: () => this.acts.rest(), forgive: () => this.acts.forgive() }),
+      form: schemaForm(chosen, { change, commit: () => this.acts.endGesture(), forgive: () => this.acts.forgive() }),
     }));
     const removable = this.acts.removable(this.thing);
     const button = (label, does) =>

@@ -15,7 +15,8 @@ const middle = (points) => ({
 });
 
 // `move` has orbit(right, down), look(right, down), pan(right, down), zoom(factor, x, y), turn(right) of the
-// environment, slide(right, down) of the magnified picture, tap(x, y, isAlt), hover(x, y) and `rest()` after each gesture.
+// environment, slide(right, down) of the magnified picture, tap(x, y, isAlt), hover(x, y) and
+// `endGesture()` after each gesture.
 // `tool()` is the one in the hand: orbit, fly, focus, inspect, ...
 export function watchGestures(stage, move, tool) {
   const fingers = new Map();
@@ -72,7 +73,7 @@ export function watchGestures(stage, move, tool) {
     if (fingers.size) return;
     stage.classList.remove("held");
     if (began && event.type === "pointerup") move.tap(event.clientX, event.clientY, event.altKey);
-    else move.rest();
+    else move.endGesture();
     began = null;
   };
   stage.addEventListener("pointerup", lift);
@@ -83,7 +84,7 @@ export function watchGestures(stage, move, tool) {
     (event) => {
       event.preventDefault();
       clearTimeout(turning);
-      turning = setTimeout(move.rest, WHEEL_REST_MS);
+      turning = setTimeout(move.endGesture, WHEEL_REST_MS);
       const scrolled = event.deltaY * WHEEL_UNITS[event.deltaMode] * WHEEL_ZOOM * (event.ctrlKey ? 4 : 1);
       move.zoom(Math.exp(scrolled), event.clientX, event.clientY);
     },

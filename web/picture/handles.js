@@ -192,7 +192,7 @@ export class Handles {
         else if (isMoved) this.say(this.#words);
         this.#dragged = null;
         this.#words = "";
-        this.acts.rest();
+        this.acts.endGesture();
         this.#refresh();
       },
     };

@@ -67,7 +67,7 @@ export class Markers {
       end: (isCancelled) => {
         if (!isMoved) acts.select(thing);
         else if (isCancelled && before) acts.edit(`/scene${thing}`, before, gesture);
-        acts.rest();
+        acts.endGesture();
       },
     };
   }

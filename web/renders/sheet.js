@@ -35,7 +35,7 @@ export class RenderSheet {
       SIDES.map((name) => fields(schema.settings, schema.settings).find((field) => field.name === name)),
       {
         change: (name, value) => this.#write(name, value),
-        commit: () => acts.rest(),
+        commit: () => acts.endGesture(),
         forgive: () => acts.forgive(),
       },
     );
@@ -66,7 +66,7 @@ export class RenderSheet {
     this.acts.forgive();
     this.#choice = choice;
     this.#put(sizeOf(choice, this.size, this.#screen));
-    this.acts.rest();
+    this.acts.endGesture();
   }
 
   #write(name, value) {
@@ -79,7 +79,7 @@ export class RenderSheet {
   #pick(quality) {
     const { max_samples: _, target_noise: __, time_limit: ___, ...settings } = this.#settings;
     this.acts.change({ settings: { ...settings, quality } });
-    this.acts.rest();
+    this.acts.endGesture();
   }
 
   // `screen`: the size of the picture on screen; `presets` with what they cost; `live`: the header of its newest frame.

@@ -30,7 +30,7 @@ export function picture({ camera, move }) {
       slide() {},
       hover() {},
       tap() {},
-      rest() {},
+      endGesture() {},
     },
     () => "orbit",
   );

@@ -90,7 +90,7 @@ READS = ToolAnnotations(read_only_hint=True, open_world_hint=False)
 SAVES = ToolAnnotations(read_only_hint=False, destructive_hint=False, idempotent_hint=True, open_world_hint=False)
 
 
-def told(tool: Callable[P, Awaitable[CallToolResult]]) -> Callable[P, Awaitable[CallToolResult]]:
+def errors_as_results(tool: Callable[P, Awaitable[CallToolResult]]) -> Callable[P, Awaitable[CallToolResult]]:
     """The tool, whose mistakes are results."""
 
     @functools.wraps(tool)
@@ -155,7 +155,7 @@ class AgentTools:
         self._scenes = AgentScenes(transport)
         self._models: list[str] = []
 
-    @told
+    @errors_as_results
     async def render(self, scene: Scene, settings: Settings = None) -> Annotated[CallToolResult, RenderAnswer]:
         """Renders a scene and shows the picture, of at most a megapixel. What takes longer than 50 s is shown as it
         is then, with the state `running`: the same call again goes on with it."""
@@ -177,7 +177,7 @@ class AgentTools:
         )
         return answered(answer, content)
 
-    @told
+    @errors_as_results
     async def render_sheet(
         self,
         scene: Scene,
@@ -202,7 +202,7 @@ class AgentTools:
         pictures = [SheetPicture(value=value, render=each["id"], state=each["state"]) for value, each in members]
         return answered(SheetAnswer(batch=status["id"], state=status["state"], pictures=pictures), picture)
 
-    @told
+    @errors_as_results
     async def patch(
         self, scene: Scene, patch: Annotated[dict[str, Any], Field(description="JSON merge patch (RFC 7396).")]
     ) -> Annotated[CallToolResult, SceneAnswer]:
@@ -211,7 +211,7 @@ class AgentTools:
         arrays (`shapes`, `lights`) are replaced whole."""
         return answered(SceneAnswer(scene=await self._scenes.patched(scene, patch)))
 
-    @told
+    @errors_as_results
     async def validate(self, scene: Scene) -> Annotated[CallToolResult, Validity]:
         """Says whether a scene is valid: what is wrong, where, and what would be right. A valid one is saved."""
         document = await self._scenes.document(scene)
@@ -222,7 +222,7 @@ class AgentTools:
                 raise
             return answered(Validity(valid=False, scene=None, problems=problems(error)))
 
-    @told
+    @errors_as_results
     async def inspect(
         self,
         scene: Scene,
@@ -261,7 +261,7 @@ class AgentTools:
             )
         )
 
-    @told
+    @errors_as_results
     async def compare(
         self,
         a: Annotated[dict[str, Any] | str, Field(description="A scene as elsewhere, or the id of a render.")],
@@ -285,7 +285,7 @@ class AgentTools:
         picture, _, _ = await asyncio.to_thread(shown, answer.content)
         return answered(Comparison(**verdict), picture)
 
-    @told
+    @errors_as_results
     async def materials(
         self, query: Annotated[str, Field(description="Part of a name, title or kind; or a model.")] = ""
     ) -> Annotated[CallToolResult, MaterialsAnswer]:
@@ -304,7 +304,7 @@ class AgentTools:
             MaterialsAnswer(materials=found[:MOST_LISTED], more=more, document=document, models=models, fields=fields)
         )
 
-    @told
+    @errors_as_results
     async def bsdf(
         self,
         material: Annotated[dict[str, Any] | str, Field(description="A material's document, or its name.")],

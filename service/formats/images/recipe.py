@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter
 
 from service.document.base import Model
-from service.document.look import Lut, ToneMap
+from service.document.grading import Lut, ToneMap
 from service.document.quality import ResolvedSettings
 from service.document.validation import validated
 from service.problems import FieldError, InvalidDocument

@@ -30,7 +30,7 @@ from service.formats.types import (
 )
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
-from service.system.shares import Turns
+from service.system.shares import FairSemaphore
 
 log = logging.getLogger(__name__)
 
@@ -79,7 +79,7 @@ class Sandbox:
 
     def __init__(self, limits: AssetLimits) -> None:
         self.limits = limits
-        self._turns = Turns(limits.children)
+        self._turns = FairSemaphore(limits.children)
         self._asking = threading.Lock()
         self._rights: Rights | None = None
         self.children = Children("service.formats.sandbox.child", FILES, ENVIRONMENT)

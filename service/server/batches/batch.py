@@ -80,7 +80,7 @@ class Batch:
         if state != "cancelled":
             self.steps.busy_s += job.outcome.setup_s + job.elapsed_s
             self.steps.measured += 1
-        self.look()
+        self.finish_if_done()
 
     def settle(self, job: Render) -> None:
         """An ended render is whole on the disk, and from now on a row there."""
@@ -98,7 +98,7 @@ class Batch:
         """Of the renders that were made."""
         return (member_id(self.id, step) for step in self.steps.that_are_made())
 
-    def look(self) -> None:
+    def finish_if_done(self) -> None:
         """Finish once its last render has ended; after it was cancelled, the last of those that there are."""
         self.changed.set()
         done = self.steps.ended == (self.steps.made if self.cancelled else self.order.renders)

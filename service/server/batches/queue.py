@@ -86,7 +86,7 @@ class BatchQueue:
         for batch in self._batches.values():
             if batch.cancelled:
                 self._cancel(batch)
-            batch.look()  # all of its renders may have ended
+            batch.finish_if_done()  # all of its renders may have ended
             if batch.finished.is_set():
                 self._renders.keep(batch)
             else:
@@ -146,7 +146,7 @@ class BatchQueue:
         for job in list(batch.jobs.values()):
             if not job.finished.is_set():
                 self._renders.cancel(job)
-        batch.look()
+        batch.finish_if_done()
 
     async def delete(self, batch: Batch) -> None:
         """Forget one that has ended, with its pictures."""
@@ -230,7 +230,7 @@ class BatchQueue:
             if batch.cancelled:
                 self._cancel(batch)
             else:
-                batch.look()  # it may be the last one, and have ended
+                batch.finish_if_done()  # it may be the last one, and have ended
         return True
 
     async def _read(self, batch: Batch) -> Members | None:

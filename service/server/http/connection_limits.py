@@ -43,12 +43,12 @@ class _Wait:
 
 
 class Watch:
-    """Ends connections without progress. `look` is to be called about once a second."""
+    """Ends connections without progress. `check` is to be called about once a second."""
 
     def __init__(self) -> None:
         self._waits: dict[Any, _Wait] = {}
 
-    def look(self, connections: Collection[Any]) -> None:
+    def check(self, connections: Collection[Any]) -> None:
         now = time.monotonic()
         waits = {each: wait for each in connections if (wait := self._wait(each, now)) is not None}
         for connection, wait in waits.items():

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.config import MIB
 from service.displays import SRGB
-from service.document.look import Lut, ToneMap, shown_as
+from service.document.grading import Lut, ToneMap, shown_as
 from service.formats import images
 from service.formats.images import animation
 from service.formats.images.animation import AnimationFormat

@@ -60,10 +60,10 @@ async def callbacks(request: Request, query: Annotated[ListQuery, Query()]) -> R
     if len(found) > query.limit:
         following = query.model_copy(update={"after": page[-1].id})
         headers["link"] = f'<callbacks?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
-    return await json_answers.made(lambda: [_told(each) for each in page], headers=headers)
+    return await json_answers.made(lambda: [_as_json(each) for each in page], headers=headers)
 
 
-def _told(callback: Callback) -> dict[str, Any]:
+def _as_json(callback: Callback) -> dict[str, Any]:
     return {
         "id": callback.id,
         "kind": callback.kind,

@@ -105,7 +105,7 @@ async def _answered(
     with (
         state.memory.growing("scenes") as hold_scenes,
         state.memory.growing("pictures") as hold_pictures,
-        under_way.told(owner, query.name) as told,
+        under_way.following(owner, query.name) as on_progress,
     ):
         sides = _Sides(state, caller, owner, hold_scenes)
         a, b = await sides.found(asked.a, "/a"), await sides.found(asked.b, "/b")
@@ -114,7 +114,7 @@ async def _answered(
         if asked.same and isinstance(a, Source):
             verdict = comparison.same(a, asked.confidence)
         else:
-            verdict = await comparison.compare(a, b, asked.confidence, told)
+            verdict = await comparison.compare(a, b, asked.confidence, on_progress)
         return await comparing(partial(_response, verdict, query))
 
 

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service import views
 from service.displays import SRGB
-from service.document.look import Lut, ToneMap, shown_as
+from service.document.grading import Lut, ToneMap, shown_as
 from service.document.text import load_json
 from service.formats import images
 from service.formats.images import recipe

@@ -78,7 +78,7 @@ class LostPictures:
         return count
 
     def names(self) -> list[str]:
-        """Of the pictures."""
+        """File names of pictures that no row refers to."""
         return sorted(name for name, _ in self._files() if name != KEEP)
 
     def _files(self) -> list[tuple[str, os.stat_result]]:

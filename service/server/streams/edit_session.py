@@ -57,12 +57,12 @@ class EditSession:
         self._given: Version | None = None  # the last one that the renderer has
         self._states = WorkingStates[Accepted]()
         self._difference: tuple[Version, Version, SceneDiff] | None = None  # of the last two that were compared
-        self.packs = False  # `settle` will pack more than a camera and materials
+        self.packs = False  # `pack_pending` will pack more than a camera and materials
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
 
     def take(self, message: protocol.Start | protocol.Update) -> Update | None:
-        """The update that the renderer needs at once; None where that can wait for `settle`, after newer ones.
+        """The update that the renderer needs at once; None where that can wait for `pack_pending`, after newer ones.
 
         Raises InvalidDocument or Conflict, and nothing has changed then.
         """
@@ -88,7 +88,7 @@ class EditSession:
         """A table of displayed colours. Raises InvalidDocument."""
         return self._reader.lut(id, owner=self._owner)
 
-    def settle(self) -> Update | None:
+    def pack_pending(self) -> Update | None:
         """The update that brings the renderer up to the documents; None when it is there."""
         version = self.version
         if version is None or version is self._given:

@@ -54,7 +54,7 @@ class FlowControl:
         self._answered.clear()
         self._ask()
 
-    def look(self, view: View, lut: Lut | None = None) -> None:
+    def set_view(self, view: View, lut: Lut | None = None) -> None:
         """`lut` is the table that the view names."""
         self.view, self._lut = view, lut
         self._serial += 1  # what was asked for before is encoded otherwise, and unwelcome
@@ -112,7 +112,7 @@ class FlowControl:
             self._anyway, self._asked = True, False
             self._ask()
 
-    async def settled(self) -> None:
+    async def idle(self) -> None:
         """Returns when the present generation has been seen, or can't be, or takes too long."""
         if self._here and self.generation is not None and len(self._unacknowledged) < CREDITS:
             try:

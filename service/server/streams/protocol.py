@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter
 
 from service.displays import SRGB, encoding_of
 from service.document.base import Model, hint
-from service.document.look import Lut, ToneMap
+from service.document.grading import Lut, ToneMap
 from service.document.text import load_json, most_bytes
 from service.document.validation import validated
 from service.formats import images

@@ -56,7 +56,7 @@ class Sessions:
     def enter(self, id: str | None, owner: str = "") -> Session:
         """A new session, or the one of that id; `leave` ends what this begins.
 
-        `owner`: whose key it is. One that another key opened is as gone as one that never was.
+        `owner`: whose key it is. A session of another key raises NotFound.
 
         Raises NotFound when it is gone, TooManyRequests when there is no room, Unavailable without a renderer.
         """

@@ -224,7 +224,7 @@ class Stream:
             elif isinstance(message, Failed):
                 await self._fall_back(message)
             elif isinstance(message, Edit):
-                await self._flow.settled()
+                await self._flow.idle()
                 await self._take(message)
             elif isinstance(message, protocol.ViewMessage):
                 try:
@@ -253,7 +253,7 @@ class Stream:
         if self._live.packs:  # threads that trace what is out of date would take the time from the one that packs
             self._renderers.send(Hold(self._task))
         try:
-            await self._tell(await self._executor.run(self._live.settle), began)
+            await self._tell(await self._executor.run(self._live.pack_pending), began)
         except ServiceError as error:
             self._refuse(error, message.generation)
 
@@ -285,7 +285,7 @@ class Stream:
         """Show the picture so. A view whose table of colours is not there changes nothing. Raises ServiceError."""
         view = message.over(self._flow.view)
         lut = None if view.lut is None else await self._executor.run(partial(self._live.lut, view.lut))
-        self._flow.look(view, lut)
+        self._flow.set_view(view, lut)
 
     def _obey(self, message: protocol.Message) -> None:
         if message.type == "ping":

@@ -78,7 +78,7 @@ class Source:
 
 Side = Still | Source
 # Called with the samples of each pixel that are taken, and those that may be taken at most.
-Told = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -110,15 +110,15 @@ class Verdict:
         return drawn(kind, self.a, self.b, self.p, self.alpha)
 
 
-async def compare(a: Side, b: Side, confidence: float, told: Told = lambda taken, most: None) -> Verdict:
+async def compare(a: Side, b: Side, confidence: float, on_progress: OnProgress = lambda taken, most: None) -> Verdict:
     """The verdict on two sides of the same size. Cancelled, it ends what it renders."""
     alpha = 1.0 - confidence
     if isinstance(a, Source) and isinstance(b, Source):
-        evidence, decision = await _of_two_documents(a, b, alpha, told)
+        evidence, decision = await _of_two_documents(a, b, alpha, on_progress)
     elif isinstance(a, Source) and isinstance(b, Still):
-        evidence, decision = await _of_one_document(a, b, "a", alpha, told)
+        evidence, decision = await _of_one_document(a, b, "a", alpha, on_progress)
     elif isinstance(a, Still) and isinstance(b, Source):
-        evidence, decision = await _of_one_document(b, a, "b", alpha, told)
+        evidence, decision = await _of_one_document(b, a, "b", alpha, on_progress)
     else:
         assert isinstance(a, Still) and isinstance(b, Still)
         evidence = await comparing(partial(Evidence, a.estimate, b.estimate, a.ways == b.ways))
@@ -172,11 +172,11 @@ class _Limits:
         return self._left_s <= 0 or quiet
 
 
-async def _of_two_documents(a: Source, b: Source, alpha: float, told: Told) -> tuple[Evidence, Decision]:
+async def _of_two_documents(a: Source, b: Source, alpha: float, on_progress: OnProgress) -> tuple[Evidence, Decision]:
     schedule, limits = of_two_documents(min(a.samples, b.samples), a.settings.seed), _Limits(a, b)
     evidence, best = None, Decision()
     for done, group in enumerate(schedule.groups):
-        told(*schedule.share(done))
+        on_progress(*schedule.share(done))
         settings = (limits.settings(each.settings, group.seed, group.samples) for each in (a, b))
         first, second = await _together(*(each.render(own) for each, own in zip((a, b), settings, strict=True)))
         limits.spend(max(first.elapsed_s, second.elapsed_s))
@@ -194,13 +194,13 @@ async def _of_two_documents(a: Source, b: Source, alpha: float, told: Told) -> t
 
 
 async def _of_one_document(
-    source: Source, still: Still, side: str, alpha: float, told: Told
+    source: Source, still: Still, side: str, alpha: float, on_progress: OnProgress
 ) -> tuple[Evidence, Decision]:
     known = still.estimate.samples
     schedule, limits = of_one_document(source.samples, known, still.seed), _Limits(source)
     evidence, best = None, Decision()
     for done, group in enumerate(schedule.groups):
-        told(*schedule.share(done))
+        on_progress(*schedule.share(done))
         taken = await source.render(limits.settings(source.settings, group.seed, group.samples))
         limits.spend(taken.elapsed_s)
         if evidence is None:
@@ -322,16 +322,16 @@ class UnderWay:
         self._samples: dict[tuple[str, str], tuple[int, int]] = {}
 
     @contextmanager
-    def told(self, owner: str, name: str | None) -> Iterator[Told]:
+    def following(self, owner: str, name: str | None) -> Iterator[OnProgress]:
         """What a comparison calls as it goes on. Without a name nobody asks; of two with one the later counts."""
         key = (owner, name or "")
 
-        def tell(taken: int, most: int) -> None:
+        def note(taken: int, most: int) -> None:
             if name is not None:
                 self._samples[key] = taken, most
 
         try:
-            yield tell
+            yield note
         finally:
             self._samples.pop(key, None)
 

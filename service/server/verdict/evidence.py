@@ -54,7 +54,7 @@ class Sum:
 
     @property
     def variance(self) -> Array:
-        """Of the mean."""
+        """Variance of the mean, per pixel."""
         return self._variance / float(self.samples) ** 2
 
 

@@ -15,7 +15,7 @@ UNLIMITED = 1 << 62
 log = logging.getLogger(__name__)
 
 
-class Holder(Protocol):
+class Evictable(Protocol):
     @property
     def rested_since(self) -> float: ...
 
@@ -29,11 +29,11 @@ class Holder(Protocol):
     def evict(self) -> None: ...
 
 
-class Memory:
+class DeviceMemory:
     """Counts the bytes that were requested from the driver, which does not say what it really takes."""
 
     def __init__(
-        self, limit: int, holders: Callable[[], Iterable[Holder]], shared: Callable[[], int] = lambda: 0
+        self, limit: int, holders: Callable[[], Iterable[Evictable]], shared: Callable[[], int] = lambda: 0
     ) -> None:
         """`shared`: the bytes of what several holders have together."""
         self.limit = limit
@@ -43,7 +43,7 @@ class Memory:
     def used(self) -> int:
         return self._shared() + sum(holder.bytes for holder in self._holders())
 
-    def make_room(self, needed: int, asking: Holder) -> None:
+    def make_room(self, needed: int, asking: Evictable) -> None:
         """Evict idle tasks, the longest at rest first, until that many bytes fit. Raises OutOfMemory."""
         while self.used + needed > self.limit and self.evict_one(asking):
             pass
@@ -53,7 +53,7 @@ class Memory:
                 f"{_mib(self.used)} are in use"
             )
 
-    def evict_one(self, asking: Holder) -> bool:
+    def evict_one(self, asking: Evictable) -> bool:
         idle = [holder for holder in self._holders() if holder.idle and holder.bytes and holder is not asking]
         if not idle:
             return False

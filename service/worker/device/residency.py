@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 from gpu import OutOfMemory, RenderSettings, scene_bytes
 from service.ipc.messages import Update
 from service.worker.device.loaded_scene import EditedScene, LoadedScene, Offloaded, needed
-from service.worker.device.memory import Holder, Memory
+from service.worker.device.memory import DeviceMemory, Evictable
 from service.worker.device.resolution_ladder import ResolutionLadder
 
 if TYPE_CHECKING:
@@ -21,7 +21,9 @@ T = TypeVar("T")
 class Residency:
     """One task's scene on the device, offloaded, or absent. Its methods raise what the renderer raises."""
 
-    def __init__(self, renderer: Renderer, memory: Memory, owner: Holder, parting: Callable[[], None]) -> None:
+    def __init__(
+        self, renderer: Renderer, memory: DeviceMemory, owner: Evictable, parting: Callable[[], None]
+    ) -> None:
         """Others evict the resources through `owner`; `parting` is called before these leave the device."""
         self.loaded: LoadedScene | None = None
         self.rested_since = 0.0
@@ -51,7 +53,7 @@ class Residency:
     def full(self) -> Picture:
         return self.ladder.full
 
-    def rests(self) -> None:
+    def touch(self) -> None:
         """Note that it was in use until now."""
         self.rested_since = time.monotonic()
 

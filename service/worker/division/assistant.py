@@ -81,7 +81,7 @@ class Assistant:
         if self._leases and self._leases[0].generation == self._tracker.generation:
             residency.wake()
             self._trace(residency.full, self._leases[0])
-        residency.rests()
+        residency.touch()
 
     def _trace(self, picture: Picture, lease: Lease) -> None:
         band = Band(lease.first, lease.count, lease.top, lease.rows)

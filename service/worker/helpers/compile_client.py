@@ -34,9 +34,8 @@ MEMORY = {True: 2 << 30, False: 8 << 30}
 MOST_COMPILERS, CORES_A_COMPILER = 4, 4
 REFUSED_S = 600.0  # before a kernel that failed is tried again
 ALONE_S = 60.0  # for which kernels are compiled by the renderer where no process could be started
-# What may be needed some time begins no earlier than this after the renderer: its user has seen a picture by then, or
-# it was there for one picture alone.
-# A kernel can take a minute, and is compiled from its beginning again where the renderer ends first.
+# Idle-time compiles start this many seconds after the renderer, so that short-lived renderers never begin one: a
+# kernel can take a minute, and is compiled from its beginning again where the renderer ends first.
 SPARE_AFTER_S = 20.0
 REMEMBERED = 256  # kernels in memory; records on the disk tell of the others
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
@@ -74,9 +73,9 @@ class CompileClient:
         self._alone_until = 0.0  # by the monotonic clock: no process can be started
         self._records = records()
         self._used = UsedKernels(cache_folder() / "used.json")
-        self._known: set[KernelKey] = set()  # kernels that are compiled, or that the driver does not keep
+        self._needs_no_wait: set[KernelKey] = set()  # kernels that are compiled, or that the driver does not keep
         self._refused: dict[KernelKey, tuple[str, float]] = {}  # why, and until when it holds
-        self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
+        self._loaded: set[KernelKey] = set()  # those of them that the renderer has loaded
         self._lanes: dict[Priority, list[Lane]] = {}
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
         memory = compiler_memory(info)
@@ -119,13 +118,13 @@ class CompileClient:
         """Whether one of its processes has nothing to do."""
         return not all(lane.wanted for lane in self._lanes[priority])
 
-    def knows(self, key: KernelKey) -> bool:
-        """Whether nobody needs to wait for this kernel any more."""
-        return key in self._known
+    def needs_no_wait(self, key: KernelKey) -> bool:
+        """True once this kernel is compiled, or the driver cannot keep it: waiting for it would gain nothing."""
+        return key in self._needs_no_wait
 
-    def has(self, key: KernelKey) -> bool:
-        """Whether the kernel loads at once, from the driver's disk cache."""
-        return key in self._met or self._is_recorded(key)
+    def on_disk(self, key: KernelKey) -> bool:
+        """True where the kernel loads at once, from the driver's disk cache."""
+        return key in self._loaded or self._is_recorded(key)
 
     @property
     def able(self) -> bool:
@@ -163,16 +162,16 @@ class CompileClient:
         for lane in self._all_lanes:
             lane.forget(done)
 
-    def met(self, key: KernelKey) -> None:
+    def loaded(self, key: KernelKey) -> None:
         """Note that the renderer has this kernel, and so has the driver's disk cache."""
-        if key in self._met:
+        if key in self._loaded:
             return
-        if len(self._known) >= REMEMBERED:  # the records know them, too
-            self._known.clear()
-            self._met.clear()
+        if len(self._needs_no_wait) >= REMEMBERED:  # the records know them, too
+            self._needs_no_wait.clear()
+            self._loaded.clear()
             _prune(self._records)
-        self._known.add(key)
-        self._met.add(key)
+        self._needs_no_wait.add(key)
+        self._loaded.add(key)
         self._record(key)
         if self.foresees:
             self._used.note(key)
@@ -208,9 +207,9 @@ class CompileClient:
         return key in lane.wanted
 
     def _is_compiled(self, key: KernelKey) -> bool:
-        if key not in self._known and self._is_recorded(key):
-            self._known.add(key)
-        return key in self._known
+        if key not in self._needs_no_wait and self._is_recorded(key):
+            self._needs_no_wait.add(key)
+        return key in self._needs_no_wait
 
     def _is_recorded(self, key: KernelKey) -> bool:
         if self._keeps is not None and key.is_ours:
@@ -265,7 +264,7 @@ class CompileClient:
     def _note(self, key: KernelKey, compiled: Compiled) -> None:
         """A process has compiled the kernel: the renderer loads it now, unless the driver keeps none."""
         log.debug("compiled ahead", {"ms": round(compiled.milliseconds)})
-        self._known.add(key)
+        self._needs_no_wait.add(key)
         if compiled.cached:
             self._record(key)
         else:

@@ -62,13 +62,13 @@ class DenoiseClient:
         self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why nothing is denoised
         given = [] if gpu is None else ["--gpu", str(gpu)]
         self._helper = HelperProcess("service.worker.helpers.denoise_main", *given)
-        self._told: Callable[[DenoiseResult], None] | None = None
+        self._on_done: Callable[[DenoiseResult], None] | None = None
         self._deaths = 0
         self._asked_at = self._took_s = 0.0
 
     @property
     def busy(self) -> bool:
-        return self._told is not None
+        return self._on_done is not None
 
     @property
     def has_answered(self) -> bool:
@@ -106,9 +106,9 @@ class DenoiseClient:
         if self._gpu is not None:
             self.start()
 
-    def ask(self, order: DenoiseRequest, told: Callable[[DenoiseResult], None]) -> None:
-        """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
-        self._told, self._asked_at = told, time.monotonic()
+    def ask(self, order: DenoiseRequest, on_done: Callable[[DenoiseResult], None]) -> None:
+        """Begins; `on_done` is called from `hear` when it is done. Only when not `busy`."""
+        self._on_done, self._asked_at = on_done, time.monotonic()
         self._helper.ask(order)
 
     def hear(self) -> None:
@@ -132,9 +132,9 @@ class DenoiseClient:
             log.warning("could not denoise", {"error": delivery.detail})
         if delivery.missing:
             self.missing = delivery.detail
-        told, self._told = self._told, None
-        if told is not None:
-            told(delivery)
+        on_done, self._on_done = self._on_done, None
+        if on_done is not None:
+            on_done(delivery)
 
     def _take_place(self, news: Located) -> None:
         if news.place == self._place:  # as before its process ended

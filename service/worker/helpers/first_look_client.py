@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 UNOPTIMISED = "nopt"  # of GALLIVM_PERF, a list of words with commas [Mesa's docs, "Environment variables"]
 TRIES = 3  # processes in a row that ended without a frame; then there are no first looks any more
 
-Told = Callable[[Frame], None]
+OnFrame = Callable[[Frame], None]
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +63,8 @@ class FirstLookClient:
         given = ["--memory", str(memory), *([] if device is None else ["--device", str(device)])]
         module = "service.worker.view.first_look_main"
         self._helper = HelperProcess(module, *given, environment={"GALLIVM_PERF": ",".join(words)})
-        self._told: dict[int, tuple[int, Told]] = {}  # by task: the generation that it waits for, and whom to tell
+        # By task: the generation that it waits for, and what to call with its frames.
+        self._on_frames: dict[int, tuple[int, OnFrame]] = {}
         self._failures = 0
 
     @property
@@ -87,17 +88,17 @@ class FirstLookClient:
             except OSError as error:
                 self._lose(str(error))
 
-    def begin(self, look: Look, told: Told) -> None:
-        """Ask for first looks; `told` gets the frames that `want` asks for."""
-        self._told[look.task] = look.generation, told
+    def begin(self, look: Look, on_frame: OnFrame) -> None:
+        """Ask for first looks; `on_frame` gets the frames that `want` asks for."""
+        self._on_frames[look.task] = look.generation, on_frame
         self._send(look)
 
     def want(self, task: int, want: Want) -> None:
         self._send(Wanted(task, want))
 
     def leave(self, task: int) -> None:
-        """The task is told of no frame any more."""
-        if self._told.pop(task, None) is not None:
+        """The task is on_frame of no frame any more."""
+        if self._on_frames.pop(task, None) is not None:
             self._send(Leave(task))
 
     def hear(self) -> None:
@@ -111,9 +112,9 @@ class FirstLookClient:
                 self._ended()
                 return
             self._failures = 0
-            generation, told = self._told.get(frame.task, (None, None))
-            if told is not None and frame.generation == generation:
-                told(frame)
+            generation, on_frame = self._on_frames.get(frame.task, (None, None))
+            if on_frame is not None and frame.generation == generation:
+                on_frame(frame)
 
     def close(self) -> None:
         self._helper.close()
@@ -129,11 +130,11 @@ class FirstLookClient:
     def _ended(self) -> None:
         """The process has ended: because it was idle, or at a scene that it could not show."""
         code = self._helper.close()
-        if self._told:
+        if self._on_frames:
             self._lose(f"its process ended with code {code}")
 
     def _lose(self, detail: str) -> None:
         self._helper.close()
         self._failures += 1
-        self._told.clear()
+        self._on_frames.clear()
         log.info("no first looks at what is compiled", {"error": detail, "tries_left": TRIES - self._failures})

@@ -36,10 +36,10 @@ class KernelWait:
         if self.compiler is not None:
             self.compiler.forget(self._hear)
 
-    def met(self, key: KernelKey) -> None:
+    def loaded(self, key: KernelKey) -> None:
         """The renderer has this kernel."""
         if self.compiler is not None:
-            self.compiler.met(key)
+            self.compiler.loaded(key)
 
     def take_ms(self) -> float:
         """Milliseconds that the last kernel took to compile elsewhere; 0 when asked again."""

@@ -66,7 +66,7 @@ class DenoisePolicy:
             self.restart()
         self.wanted = wanted
 
-    def look(self, view: View) -> None:
+    def set_view(self, view: View) -> None:
         """Take what the view says."""
         if is_for_the_eye(view) and not self.live:
             self._denoiser.start()
@@ -130,11 +130,11 @@ class DenoisePolicy:
         picture: Picture,
         progress: Progress,
         fine: bool,
-        told: Callable[[], None],
+        on_done: Callable[[], None],
         scale: float = 1.0,
         guided: bool = True,
     ) -> None:
-        """Have the picture denoised as it is now; `told` is called when that is done or has failed. Without being
+        """Have the picture denoised as it is now; `on_done` is called when that is done or has failed. Without being
         `guided` by the first hits it is worse, and at hand before there is a kernel for those."""
         color, guides = picture.read(), picture.guides(GUIDE_SAMPLES) if guided else None
         weight = self._weight(progress.noise)
@@ -151,7 +151,7 @@ class DenoisePolicy:
             else:
                 shown = delivery.pixels if weight == 1.0 else color + np.float32(weight) * (delivery.pixels - color)
                 self.latest = Denoised(shown, progress, fine, scale)
-            told()
+            on_done()
 
         self._denoiser.ask(denoise_request(color, guides, fine), hear)
 

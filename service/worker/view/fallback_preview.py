@@ -70,7 +70,7 @@ class FallbackPreview:
         if self._superset is None or self._compiler is None:
             return None
         key = fallback.kernel_key(wanted.arrays, wanted.settings, self._superset)
-        return key if key is not None and self._compiler.has(key) else None
+        return key if key is not None and self._compiler.on_disk(key) else None
 
     def begin(self, wanted: KernelRequest, generation: int) -> None:
         """Begin to show what `can` be shown; where loading fails, nothing is shown."""
@@ -86,7 +86,7 @@ class FallbackPreview:
                 scene = self._renderer.load_fallback(wanted.arrays, self._superset)
                 self._raised = self._superset
             self._look.begin(scene, settings, generation)
-            self._compiler.met(kernel)
+            self._compiler.loaded(kernel)
         except GpuError as error:
             log.info("could not show a preview by the fallback kernel", {"error": error})
             self.release()

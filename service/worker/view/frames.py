@@ -21,7 +21,7 @@ from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress import ProgressTracker
 from service.worker.view.denoise_policy import Denoised, DenoisePolicy
-from service.worker.view.prior import UnderHand
+from service.worker.view.prior import PriorGuess
 
 if TYPE_CHECKING:
     from gpu import Picture, Prior
@@ -63,7 +63,7 @@ class FrameSource:
         residency: Residency,
         tracker: ProgressTracker,
         denoising: DenoisePolicy,
-        under_hand: UnderHand,
+        prior: PriorGuess,
         finish: Callable[[], None],
     ) -> None:
         """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
@@ -71,7 +71,7 @@ class FrameSource:
         self.scale: float | None = None  # of what there is to see
         self.owes_done = False
         self.denoising = denoising
-        self._number, self._send, self._finish, self._under_hand = number, context.send, finish, under_hand
+        self._number, self._send, self._finish, self._prior = number, context.send, finish, prior
         self._residency, self._tracker = residency, tracker
         self._wait = KernelWait(context.compiler, client)  # for the kernel of the AOVs of the first hit
         self._served: _Content | None = None  # of the last frame that was sent
@@ -155,7 +155,7 @@ class FrameSource:
     def _guess(self, view: View, scale: float) -> Prior | None:
         """The guess at the picture that is shown until that has samples of its own."""
         shows = view.prior and view.aov == "color" and view.encoding != "linear"
-        return self._under_hand.shown(self._residency.ladder, scale) if shows else None
+        return self._prior.shown(self._residency.ladder, scale) if shows else None
 
     def _smooths(self, shown: float, prior: Prior | None) -> bool:
         """Whether a picture of that scale may be shown denoised: a small one of the view's, where no guess at the
@@ -199,7 +199,7 @@ class FrameSource:
     def _give(self, read: Read, full: Picture | None, clean: Denoised | None) -> None:
         pixels = pixels_of(full, read.view, clean) if full else None
         progress = clean.progress if clean else self._tracker.progress(self._residency)
-        self._residency.rests()
+        self._residency.touch()
         self._send(Image(self._number, read.serial, pixels, progress, clean is not None))
 
     @property
@@ -254,7 +254,7 @@ class FrameSource:
         scene, entry = picture.scene, kernel_keys.COVER if coverage else kernel_keys.GUIDES
         wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, entry)
         if not self._wait.begin(wanted):
-            self._wait.met(wanted)  # in a moment
+            self._wait.loaded(wanted)  # in a moment
         return self._wait.compiling
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:

@@ -1,4 +1,4 @@
-"""The picture under the hand: after an edit, while its own picture is small or has few samples, a better guess.
+"""A prior for the picture after an edit: a better guess while its own picture is small or has few samples.
 
 Before the edit the picture is kept on the device (gpu.Prior), with the small first looks that were traced of it.
 First looks at the edited scene follow the same random numbers, and say what has changed. The guess fades as samples
@@ -31,7 +31,7 @@ WORTH = ((16, 8.0), (32, 4.0), (64, 2.0))
 log = logging.getLogger(__name__)
 
 
-class UnderHand:
+class PriorGuess:
     """One task's guess. `keep` before an edit, `restart` after it; then `correct` by first looks, and `shown`."""
 
     def __init__(self, renderer: Renderer, make_room: Callable[[int], None]) -> None:

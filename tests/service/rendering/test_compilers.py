@@ -83,7 +83,7 @@ def test_a_process_is_replaced_after_some_kernels_or_where_it_has_grown(gpu: Ren
         compiler, processes = client(gpu, STARTED, *answers[:replaced_after], STARTED, *answers[replaced_after:])
         for number in range(len(answers)):
             key = KEYS[number % len(KEYS)]
-            compiler._known.clear()
+            compiler._needs_no_wait.clear()
             for record in compile_client.records().glob("*"):
                 record.unlink()
             assert compiler.queue(key, lambda milliseconds: None)
@@ -147,7 +147,7 @@ def test_where_no_process_starts_the_renderer_compiles_for_a_minute(gpu: Rendere
     now[0] += ALONE_S
     assert compiler.able and compiler.queue(KEYS[0], done.append)
     heard(compiler)
-    assert done == [0.0, 1.0] and compiler.has(KEYS[0])
+    assert done == [0.0, 1.0] and compiler.on_disk(KEYS[0])
 
 
 def test_a_process_gets_no_more_memory_than_it_may_take(
@@ -187,7 +187,7 @@ def test_kernels_are_compiled_side_by_side_where_a_gpu_leaves_the_cores_idle(
     assert [helper.asked for helper in processes["now"]] == [[0], [1]]
     assert processes["spare"][0].asked == [2] and not processes["spare"][0].paused
     heard(compiler)
-    assert done == [1.0] * 3 and all(compiler.has(key) for key in KEYS[:3])
+    assert done == [1.0] * 3 and all(compiler.on_disk(key) for key in KEYS[:3])
 
 
 def test_a_processor_that_renders_has_one_compiler() -> None:

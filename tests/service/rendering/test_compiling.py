@@ -34,7 +34,7 @@ from service.ipc.messages import (
     Want,
     driver_of,
 )
-from service.ipc.task_control import Drop, Settle
+from service.ipc.task_control import ApplyNow, Drop
 from service.pack import pack, pack_material
 from service.worker.helpers.compile_client import records
 from service.worker.helpers.compile_lane import Compiled
@@ -198,7 +198,7 @@ ROUTES: dict[str, tuple[list[list[Any]], set[str]]] = {
     ),
     "paths of light": ([[update(FIRST, document=GLASS, caustics="light")]], {"pathtrace.comp", "lighttrace.comp"}),
     "other settings": ([[update(FIRST)], [update(FIRST, 2, clamp=5.0)]], {"pathtrace.comp"}),
-    "states one by one": ([[update(FIRST), Settle(FIRST), update(FIRST, 2, clamp=5.0)]], {"pathtrace.comp"}),
+    "states one by one": ([[update(FIRST), ApplyNow(FIRST), update(FIRST, 2, clamp=5.0)]], {"pathtrace.comp"}),
     "a saved picture": ([[update(FIRST), restored]], {"pathtrace.comp"}),
     "first hits": ([[update(FIRST)], [Read(FIRST, 1, View("normal"))]], {"pathtrace.comp", "guides.comp"}),
     "coverage": ([[update(FIRST)], [Read(FIRST, 1, View("shape_coverage"))]], {"pathtrace.comp", "cover.comp"}),

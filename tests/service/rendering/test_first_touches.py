@@ -32,7 +32,7 @@ class Shown:
         self._session = EditSession(READER, 1)
         self._generation = 1
         start = protocol.Start(type="start", generation=1, scene=document, settings=SETTINGS)
-        update = self._session.take(start) or self._session.settle()
+        update = self._session.take(start) or self._session.pack_pending()
         assert update is not None and update.settings is not None
         self.settings = RenderSettings(**update.settings)
         self.loaded: Offloaded | None = None
@@ -58,7 +58,7 @@ class Shown:
         """The kernel that the renderer asks for after a merge patch; None where it goes on with the one it has."""
         self._generation += 1
         message = protocol.Update(type="update", generation=self._generation, scene=patch)
-        update = self._session.take(message) or self._session.settle()
+        update = self._session.take(message) or self._session.pack_pending()
         if update is None:
             return None
         return kernel_request(update, self.settings, self._take(update), loaded=True)

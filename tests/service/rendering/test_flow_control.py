@@ -54,7 +54,7 @@ def flowing(test: Callable[[Renderer], Awaitable[None]]) -> Callable[[], None]:
 
 @flowing
 async def test_nothing_is_asked_for_before_a_start(renderer: Renderer) -> None:
-    renderer.flow.look(View(exposure=1.0))
+    renderer.flow.set_view(View(exposure=1.0))
     assert not renderer.wants
     renderer.flow.update(1, 0.0)
     assert renderer.wants[0].view.exposure == 1.0
@@ -89,7 +89,7 @@ async def test_an_old_generation_is_not_welcome(renderer: Renderer) -> None:
 async def test_a_view_replaces_the_want(renderer: Renderer) -> None:
     renderer.flow.update(1, 0.0)
     old = renderer.frame(1)
-    renderer.flow.look(View(exposure=2.0))
+    renderer.flow.set_view(View(exposure=2.0))
     assert renderer.wants[-1].anyway and renderer.wants[-1].view.exposure == 2.0
     assert not renderer.flow.welcome(old) and len(renderer.wants) == 2
     assert renderer.deliver(1)
@@ -105,7 +105,7 @@ async def test_a_view_without_a_credit_makes_what_is_under_way_unwelcome(rendere
     await asyncio.sleep(0.01)
     late = renderer.frame(1)
     assert renderer.deliver(1)
-    renderer.flow.look(View(format="rgba32f"))
+    renderer.flow.set_view(View(format="rgba32f"))
     assert not renderer.flow.welcome(late), "its pixels are encoded for another format"
     renderer.flow.acknowledge(2)
     assert renderer.wants[-1].view.encoding == "linear" and renderer.deliver(1)
@@ -114,7 +114,7 @@ async def test_a_view_without_a_credit_makes_what_is_under_way_unwelcome(rendere
 @flowing
 async def test_a_changed_view_survives_an_update(renderer: Renderer) -> None:
     renderer.flow.update(1, 0.0)
-    renderer.flow.look(View(exposure=2.0))
+    renderer.flow.set_view(View(exposure=2.0))
     renderer.flow.update(2, 0.0)
     assert not renderer.deliver(1)
     assert renderer.wants[-1].anyway and renderer.deliver(2)
@@ -126,7 +126,7 @@ async def test_pace_slows_but_not_for_what_was_just_asked_for(renderer: Renderer
     renderer.deliver(1, elapsed_s=100.0)
     await asyncio.sleep(0.1)
     assert len(renderer.wants) == 1, "a picture of 100 s changes little in .1 s"
-    renderer.flow.look(View(exposure=1.0))
+    renderer.flow.set_view(View(exposure=1.0))
     assert len(renderer.wants) == 2
     renderer.deliver(1, elapsed_s=100.0)
     renderer.flow.acknowledge(1)
@@ -137,18 +137,18 @@ async def test_pace_slows_but_not_for_what_was_just_asked_for(renderer: Renderer
 @flowing
 async def test_an_update_waits_for_its_predecessors_frame(renderer: Renderer) -> None:
     loop = asyncio.get_running_loop()
-    await renderer.flow.settled()  # nothing was started: no wait
+    await renderer.flow.idle()  # nothing was started: no wait
     renderer.flow.update(1, 0.0)
     began = loop.time()
     loop.call_later(0.05, renderer.deliver, 1)
-    await renderer.flow.settled()
+    await renderer.flow.idle()
     assert loop.time() - began == pytest.approx(0.05)
     renderer.flow.update(2, 0.0)
     began = loop.time()
-    await renderer.flow.settled()
+    await renderer.flow.idle()
     assert loop.time() - began == pytest.approx(PATIENCE_S), "a frame that doesn't come is not waited for"
     assert renderer.deliver(2)
     renderer.flow.update(3, 0.0)
     began = loop.time()
-    await renderer.flow.settled()
+    await renderer.flow.idle()
     assert loop.time() == began, "without a credit no frame can come"

@@ -115,7 +115,7 @@ def shown(policy: DenoisePolicy, noise: float | None, scale: float = 1.0) -> flo
 def test_it_fades_as_the_noise_falls() -> None:
     policy = DenoisePolicy(denoiser := Aside(), yields=True)
     assert not policy.covers("color", None)
-    policy.look(View(denoise=True))
+    policy.set_view(View(denoise=True))
     assert denoiser.started and policy.covers("color", None) and policy.covers("color", 0.016)
     assert not policy.covers("color", 0.014) and not policy.covers("color", None, kept=True)
     assert [shown(policy, noise) for noise in (None, 0.5, 0.03)] == [1.0, 1.0, 1.0]
@@ -124,7 +124,7 @@ def test_it_fades_as_the_noise_falls() -> None:
 
 def test_the_setting_has_it_whole_and_begins_anew() -> None:
     policy = DenoisePolicy(Aside(), yields=True)
-    policy.look(View(denoise=True))
+    policy.set_view(View(denoise=True))
     assert shown(policy, 0.0225) == pytest.approx(0.5)
     policy.want(True)
     assert policy.latest is None and policy.covers("color", 0.006, kept=True)
@@ -133,6 +133,6 @@ def test_the_setting_has_it_whole_and_begins_anew() -> None:
 
 def test_a_larger_picture_is_due_at_once() -> None:
     policy = DenoisePolicy(Aside(), yields=True)
-    policy.look(View(denoise=True))
+    policy.set_view(View(denoise=True))
     shown(policy, None, scale=0.25)
     assert policy.has(3) is None and not policy.due(3, fine=False, scale=0.25) and policy.due(1, fine=False)

@@ -23,7 +23,7 @@ from service.ipc.messages import (
     View,
     Want,
 )
-from service.ipc.task_control import Pause, Resume, Settle
+from service.ipc.task_control import ApplyNow, Pause, Resume
 from service.problems import Unavailable
 from service.renderers.local.process import Waiting
 from service.renderers.pool.pool import Pool, Seat
@@ -243,7 +243,7 @@ def test_one_renderer_can_help_with_the_task_of_another() -> None:
             else:
                 helper.relay(message)
         told = fakes.processes[1].told
-        assert [type(message) for message in told] == [Update, Update, Settle, Update, Update]
+        assert [type(message) for message in told] == [Update, Update, ApplyNow, Update, Update]
         assert [message.generation for message in told if isinstance(message, Update)] == [1, 2, 1, 3]
         assert told[-1].settings == settings(9) and told[-1].stop == StopRule(4)
         fakes.processes[1].say(Failed(task, 3, "of the helper"))

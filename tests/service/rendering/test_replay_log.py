@@ -9,7 +9,7 @@ import pytest
 
 from service.ipc import channel
 from service.ipc.messages import Failed, Loaded, StopRule, Update
-from service.ipc.task_control import Settle
+from service.ipc.task_control import ApplyNow
 from service.renderers.replay_log import ReplayLog
 from service.renderers.working_states import MOST
 
@@ -38,7 +38,7 @@ def generations(log: ReplayLog) -> list[int]:
     out: list[int] = []
     for message in log.scenes():
         sent: Any = channel.decode(*message) if isinstance(message, tuple) else message
-        if not isinstance(sent, Settle):
+        if not isinstance(sent, ApplyNow):
             out.append(sent.generation)
     return out
 

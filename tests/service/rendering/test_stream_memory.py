@@ -96,7 +96,7 @@ def test_versions_that_nobody_has_seen_are_not_all_kept() -> None:
     client.works = 1
     for generation in range(2, 50):
         say(client, generation, scene={"camera": {"vfov": generation}})
-        client.settle()
+        client.pack_pending()
     kept = [generation for generation, _ in client._states.items()]
     assert len(kept) == working_states.MOST and kept[0] == 1 and kept[-1] == 49
     assert client.failed(49, 1) is None and client.version is not None and client.version.generation == 1

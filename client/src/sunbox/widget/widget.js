@@ -1526,7 +1526,7 @@ last=fingers.size ? middle([...fingers.values()]):null;
 if(fingers.size)return;
 stage.classList.remove("held");
 if(began&&event.type==="pointerup")move.tap(event.clientX,event.clientY,event.altKey);
-else move.rest();
+else move.endGesture();
 began=null;
 };
 stage.addEventListener("pointerup",lift);
@@ -1536,7 +1536,7 @@ stage.addEventListener(
 (event)=>{
 event.preventDefault();
 clearTimeout(turning);
-turning=setTimeout(move.rest,WHEEL_REST_MS);
+turning=setTimeout(move.endGesture,WHEEL_REST_MS);
 const scrolled=event.deltaY * WHEEL_UNITS[event.deltaMode] * WHEEL_ZOOM *(event.ctrlKey ? 4:1);
 move.zoom(Math.exp(scrolled),event.clientX,event.clientY);
 },
@@ -1572,7 +1572,7 @@ look(){},
 slide(){},
 hover(){},
 tap(){},
-rest(){},
+endGesture(){},
 },
 ()=>"orbit",
 );
