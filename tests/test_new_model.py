@@ -33,7 +33,7 @@ import numpy as np
 from gpu import Renderer, RenderSettings
 from service.config import Config
 from service.pack import pack
-from service.server.requests.conversion_request import parse_conversion
+from service.server.requests.parsers import parse_conversion
 from service.document import parse_scene
 
 def scene(model):

@@ -1,4 +1,4 @@
-"""The commands, a module each: `run(arguments) -> exit code`; and the errors that end them early.
+"""The commands, a module each: `run(arguments) -> exit code`; the errors that end them early, and the configuration.
 
 __main__       `python -m service.cli`
 program        the command line: which commands there are, and the exit code
@@ -24,7 +24,6 @@ check_data     whether the data folder is sound
 bench          the benchmarks
 health         the container's health check
 assets         the assets of a scene, and their ids
-configuration  the configuration; a mistake in it ends the command
 documents      documents and settings, from files and from `--set`
 files          files that are read, and written whole or not at all
 models         models with the files that they refer to
@@ -34,6 +33,11 @@ local          renders in a Python program's own process: `sunbox.render`
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from service.config import Config
 
 
 class CommandError(Exception):
@@ -54,3 +58,13 @@ class BadInput(CommandError):
     """The input was wrong: each line names the place and says what would be right."""
 
     exit_code = 2
+
+
+def configuration(**given: Any) -> Config:
+    """`given` (where not None) over the environment's SUNBOX_*. Raises BadInput naming each bad variable."""
+    from service.config import ConfigError, load_config
+
+    try:
+        return load_config(**given)
+    except ConfigError as error:
+        raise BadInput(str(error)) from None

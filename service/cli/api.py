@@ -14,8 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli import BadInput, Failed, health
-from service.cli.configuration import configuration
+from service.cli import BadInput, Failed, configuration, health
 
 if TYPE_CHECKING:
     from sunbox import Client, SunboxError

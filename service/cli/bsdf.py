@@ -13,8 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli import BadInput, Failed, files
-from service.cli.configuration import configuration
+from service.cli import BadInput, Failed, configuration, files
 from service.cli.documents import refusals
 
 if TYPE_CHECKING:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from service.cli import CommandError
-from service.cli.configuration import configuration
+from service.cli import CommandError, configuration
 from service.problems import Unavailable
 from service.server.callbacks.signing import secrets_of
 

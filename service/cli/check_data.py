@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from service.cli import BadInput
-from service.cli.configuration import configuration
+from service.cli import BadInput, configuration
 from service.server.renders.store.check import check_renders
 from service.server.storage.data_check import check
 

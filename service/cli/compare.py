@@ -10,7 +10,7 @@ from service.cli.api import server_or_own
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from service.cli.configuration import configuration
+    from service.cli import configuration
 
     comparing.check_confidence(arguments)
     output = None if arguments.output is None else files.writable(Path(arguments.output))

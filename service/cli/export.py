@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from service.cli import BadInput, files
-from service.cli.configuration import configuration
+from service.cli import BadInput, configuration, files
 from service.cli.documents import read_source, refusals, source_assets
 
 

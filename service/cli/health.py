@@ -13,8 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from service.cli import CommandError
-from service.cli.configuration import configuration
+from service.cli import CommandError, configuration
 
 TIMEOUT_S = 4.0
 

@@ -12,8 +12,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli import BadInput, files
-from service.cli.configuration import configuration
+from service.cli import BadInput, configuration, files
 from service.cli.documents import asset_folders, picture_size, read_settings, refusals
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.cli import BadInput, Failed
-from service.cli.configuration import configuration
+from service.cli import BadInput, Failed, configuration
 from service.cli.documents import pack_scene, read_source, source_assets
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service import displays
-from service.cli import BadInput, Failed, files
-from service.cli.configuration import configuration
+from service.cli import BadInput, Failed, configuration, files
 from service.cli.documents import (
     Source,
     pack_scene,

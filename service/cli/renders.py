@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _submit(client: Client, arguments: argparse.Namespace) -> int:
     """The id goes to stdout."""
-    from service.cli.configuration import configuration
+    from service.cli import configuration
     from service.cli.documents import read_settings, read_source, with_uploads
     from service.cli.models import is_model
 

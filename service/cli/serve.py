@@ -7,7 +7,7 @@ import logging
 import os
 from pathlib import Path
 
-from service.cli.configuration import configuration
+from service.cli import configuration
 
 CLOSED = (
     "SUNBOX_DATA_DIR cannot be used by user {user}: user {owner} owns {folder} and keeps others from reading or "

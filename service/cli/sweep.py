@@ -65,7 +65,7 @@ def batch_file(
     arguments: argparse.Namespace, over: list[dict[str, Any]], output: Path, made: Callable[[Batch], bytes]
 ) -> None:
     """Render the batch and write the file that is `made` of it."""
-    from service.cli.configuration import configuration
+    from service.cli import configuration
     from service.cli.documents import read_settings, read_source, with_uploads
 
     config = configuration()

@@ -46,7 +46,7 @@ class Case:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from service.cli.configuration import configuration
+    from service.cli import configuration
 
     comparing.check_confidence(arguments)
     sheet, report = (

@@ -10,8 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.cli import Failed
-from service.cli.configuration import configuration
+from service.cli import Failed, configuration
 from service.cli.documents import pack_scene, read_source, source_assets
 from service.config import cores
 from service.document import presets

@@ -19,8 +19,8 @@ from service.formats import Assets, ImageData, MeasuredData, MeshData
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import Earlier, assemble
 from service.pack.geometry.geometry import Geometry
+from service.pack.geometry.instances import shift
 from service.pack.geometry.shape_records import bodies, odd_media, shape_spaces
-from service.pack.geometry.shared_meshes import shift
 from service.pack.geometry.warnings import odd_meshes
 from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights

@@ -24,8 +24,7 @@ from service.pack import Packed
 from service.problems import Unavailable
 from service.renderers.bsdf_questions import BsdfQuestions
 from service.renderers.protocol import Member, Renderers
-from service.server.batches.batch import Batch
-from service.server.batches.members import Members
+from service.server.batches.batch import Batch, Members
 from service.server.batches.queue import BatchQueue
 from service.server.callbacks.queue import Callbacks
 from service.server.http.downloads import Downloads

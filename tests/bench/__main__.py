@@ -11,9 +11,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from service.cli import BadInput, Failed
+from service.cli import BadInput, Failed, configuration
 from service.cli.bench import need_matplotlib, output_path, progress, refuse_quick_publishing, write_figures
-from service.cli.configuration import configuration
 from service.cli.documents import read_source, source_assets
 from service.cli.program import exit_code
 from service.document import presets

@@ -24,7 +24,7 @@ from service.formats.types import AssetLimits
 from service.server.app import create_app
 from service.server.state import AppState
 from service.system.child_processes import ROOT, Children, inherited_environment
-from service.system.confined import Rights, kernel, rights
+from service.system.confined import Rights, child, kernel
 from service.system.confined.kernel import AUDIT_ARCH, READING, RIGHTS, system_calls
 from tests import privileges
 from tests.serving import KEYS, SCENE, SMALL, Server, families
@@ -34,7 +34,7 @@ PYTHONS = {"as the tests": privileges._own, "without capabilities": None}
 TRIES = """
 import ctypes, fcntl, json, os, resource, signal, socket, struct, subprocess, sys
 from dataclasses import asdict
-from service.system.confined import confine, renounce, rights as layers
+from service.system.confined import child as layers, confine, renounce
 folder, victim, layer = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 if layer == "landlock":
     layers.filter_system_calls = lambda calls: False
@@ -345,4 +345,4 @@ def test_packages_are_read_where_they_were_installed(tmp_path: Path, monkeypatch
     (packages / "pydantic-2.0.dist-info").mkdir(parents=True)
     other.mkdir()
     monkeypatch.setattr(sys, "path", [*sys.path, str(packages), str(other)])
-    assert packages in list(rights.readable()) and other not in list(rights.readable())
+    assert packages in list(child.readable()) and other not in list(child.readable())

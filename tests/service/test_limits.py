@@ -95,7 +95,7 @@ CODE = {
     "server/routes/bsdf.py AT_ONCE": "numbers of one answer that are encoded at once",
     "server/routes/editor_files.py MOST": "files of the page, of which there are fewer",
     "server/routes/events.py AT_ONCE": "events of one stream of them",
-    "server/routes/example_answers.py WAITING": "an example of an answer",
+    "server/routes/examples.py WAITING": "an example of an answer",
     "server/state.py MOST_WAITS": "of one caller",
     "server/state.py self.uploads = Shares": SHARES,
     "server/state.py self.waits = Shares": SHARES,

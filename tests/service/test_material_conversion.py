@@ -13,7 +13,7 @@ from service.document import parse_scene
 from service.document.material import MODELS
 from service.document.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from service.problems import InvalidDocument
-from service.server.requests.conversion_request import parse_conversion
+from service.server.requests.parsers import parse_conversion
 from tests import microfacets
 from tests.serving import SCENE, Server
 

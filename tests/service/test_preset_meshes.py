@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from trimesh.visual import ColorVisuals
 
-from service.document.presets import disney_charts
+from service.document.presets import computed
 from service.document.presets.generated import ASSETS, asset
 
 MESHES = [name for name in ASSETS if asset(name).startswith(b"ply")]
@@ -88,7 +88,7 @@ def test_a_liquid_reaches_into_its_glass(glass: str, filling: str) -> None:
 
 def test_labels_are_read_from_the_left() -> None:
     """An L has its foot on the right of its stem."""
-    mesh = read(disney_charts.written([("L", 0, 0, 0)], 1))
+    mesh = read(computed.written([("L", 0, 0, 0)], 1))
     centers = mesh.vertices.reshape(-1, 4, 3).mean(axis=1)[:, :2].tolist()
     assert sorted(centers) == [[0.5, y - 2.0] for y in range(5)] + [[1.5, -2.0], [2.5, -2.0]]
     assert (mesh.face_normals[:, 2] > 0).all()

@@ -46,7 +46,7 @@ THREADS = 8
 CHANGED = {
     "renderers/ray/gateway.py _written": "appended to by one thread, and read as a whole",
     "server/renders/store/fitting.py _adapters": "the same value under a key, whoever makes it",
-    "server/routes/idempotency.py _turns": "of the event loop",
+    "server/routes/submission.py _turns": "of the event loop",
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",

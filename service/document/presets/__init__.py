@@ -14,8 +14,7 @@ plants         an orange, a tree
 metalwork      a watch, the flank of a car
 subjects       what materials are shown on: a shader ball, a torus knot, a cyclorama
 environments   painted skies, and photographers' studios
-field          a thousand spheres
-disney_charts  spheres that show what each parameter of `disney` does, and the words beside them
+computed          scenes that would be long files of numbers: charts of `disney` with their labels, a thousand spheres
 encoders          writers of the plainest OpenEXR and PLY files
 """
 
@@ -29,8 +28,7 @@ from importlib.resources import files
 from typing import Any
 
 from service.document.presets import physically_based
-from service.document.presets.disney_charts import parameter_grid, parameter_rows
-from service.document.presets.field import sphere_field
+from service.document.presets.computed import parameter_grid, parameter_rows, sphere_field
 from service.document.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable
 from functools import cache
 
-from service.document.presets import disney_charts, environments, metalwork, plants, subjects, tabletop, upholstery
+from service.document.presets import computed, environments, metalwork, plants, subjects, tabletop, upholstery
 
 ASSETS: dict[str, Callable[[], bytes]] = {
     "studio": environments.studio,
@@ -46,8 +46,8 @@ ASSETS: dict[str, Callable[[], bytes]] = {
     "chair-pillow": upholstery.pillow,
     "chair-leg": upholstery.leg,
     "bare-tree": plants.bare_tree,
-    "disney-parameters-labels": disney_charts.parameter_labels,
-    "disney-grid-labels": disney_charts.grid_labels,
+    "disney-parameters-labels": computed.parameter_labels,
+    "disney-grid-labels": computed.grid_labels,
     "watch-case": metalwork.case,
     "watch-markers": metalwork.markers,
     "watch-hands": metalwork.hands,

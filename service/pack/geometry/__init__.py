@@ -9,8 +9,7 @@ displacement      meshes that a height moves, cut until their edges are short en
 vertex_normals    smooth normals at the corners, and their codes
 corner_angles     the loop over faces that finds these, as machine code
 tangents          the directions that a material's highlights and normal maps run along
-shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
-instances         the choice of shared meshes, and the records of the shapes that show them
+instances         meshes that several shapes share, each with a tree of its own, and the records of these shapes
 scene_bvh         the tree over the scene, and the few shapes that stand in a loop instead
 records           analytic shapes -> records with their bounds
 shape_records     members of the records of all kinds: hidden shapes, lights, what fills shapes, solid coordinates

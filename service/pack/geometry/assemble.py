@@ -15,12 +15,12 @@ from service.document.shape import Shape
 from service.formats import Assets
 from service.pack.geometry import instances, meshes, scene_bvh
 from service.pack.geometry.geometry import Geometry, MeshExtents, write_triangles
+from service.pack.geometry.instances import SharedMesh
 from service.pack.geometry.meshes import Triangles
 from service.pack.geometry.rebase import Rebased, rebase
 from service.pack.geometry.records import Bounds
 from service.pack.geometry.scene_bvh import SceneBvh, build_scene_bvh, stand_out
 from service.pack.geometry.shape_records import area_lights, hide
-from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.warnings import counted
 from service.pack.geometry.world import ShapeMaterials, World, place, place_analytic
 from service.pack.parameters import vec3

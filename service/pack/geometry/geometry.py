@@ -12,8 +12,8 @@ import numpy as np
 
 from gpu.layout import Node, ShapeKind, Triangle, TriangleNormals
 from service.document.numbers import Vec3
+from service.pack.geometry.instances import SharedMesh
 from service.pack.geometry.meshes import Triangles
-from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.warnings import OddMesh
 from service.system.shared_memory import SharedArena
 

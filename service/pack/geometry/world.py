@@ -15,9 +15,8 @@ from service.formats.read.mesh_checks import mesh_oddities
 from service.pack.geometry import instances, meshes
 from service.pack.geometry.analytic import AnalyticShapes, check_reach
 from service.pack.geometry.displacement import Displacement, displaced
-from service.pack.geometry.instances import Instance, MeshRequest
+from service.pack.geometry.instances import Instance, MeshRequest, SharedMesh, blank, shared_mesh
 from service.pack.geometry.meshes import Chart, PlacedMesh
-from service.pack.geometry.shared_meshes import SharedMesh, blank, shared_mesh
 from service.pack.geometry.warnings import OddMesh
 from service.pack.textures.heights import HeightField
 from service.pack.textures.uses import RequiredCharts

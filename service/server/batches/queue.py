@@ -8,8 +8,7 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from service.problems import MISTAKE, Conflict, Gone, Internal, NotFound, ServiceError, TooManyRequests, Unavailable
-from service.server.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, member_id, step_of
-from service.server.batches.members import Members
+from service.server.batches.batch import ID_DIGITS, RENDERS_OF_ONE, STEP_DIGITS, Batch, Members, member_id, step_of
 from service.server.renders.queue import RETRY_S, RenderQueue
 from service.server.renders.render import Render
 from service.server.renders.retention import looked_at

@@ -7,13 +7,18 @@ from dataclasses import is_dataclass
 from functools import cache
 from typing import Any, Literal, get_args, get_type_hints
 
+from pydantic import Field, TypeAdapter
+
 from service.config import Config
-from service.document import Scene, load_json
-from service.document.material.conversion import Converted
+from service.document import Material, Scene, load_json
+from service.document.base import Model
+from service.document.material import MODELS
+from service.document.material.conversion import Converted, Document, converted, parameters
+from service.document.validation import among, validated
+from service.problems import FieldError, InvalidDocument, escaped
 from service.server.requests.batch_request import parse_batch
 from service.server.requests.bsdf_request import BsdfRequest, parse_albedo, parse_terms, parse_values
 from service.server.requests.compare_request import parse_compare
-from service.server.requests.conversion_request import parse_conversion
 from service.server.requests.export_request import parse_export
 from service.server.requests.request_parser import ParsedRequest, RequestParser
 from service.server.storage.documents import CheckedDocument, checked
@@ -102,3 +107,47 @@ def _collect(annotation: Any, found: set[type]) -> None:
             _collect(hint, found)
     for part in get_args(annotation):
         _collect(part, found)
+
+
+class ConversionBody(Model):
+    material: Material
+    to: str
+    choose: dict[str, str] = Field(default_factory=dict)
+
+
+_CONVERSION = TypeAdapter(ConversionBody)
+
+
+def parse_conversion(body: bytes | bytearray | memoryview) -> Converted:
+    """The converted material. Raises MalformedJson, InvalidDocument."""
+    document = load_json(body)
+    parsed = validated(_CONVERSION, document, "")
+    before, after = type(parsed.material), MODELS.get(parsed.to)
+    if after is None:
+        raise InvalidDocument([FieldError("/to", f"is not known: {parsed.to[:40]!r}; known are {', '.join(MODELS)}")])
+    found = converted(document["material"], before, after)
+    material: Document = found.material
+    for name, value in parsed.choose.items():
+        _check_choice(after.name(), name, value)
+        material = after.chosen(material, name, value)
+    for name, parameter in parameters(after).items():
+        if parameter.is_required and parameter.file_kind and name not in material:
+            detail = (
+                f"is required: {after.name()} is of a file, the id of an asset of the kind {parameter.file_kind!r}"
+            )
+            raise InvalidDocument([FieldError(f"/choose/{escaped(name)}", detail)])
+    return Converted(material, found.lost)
+
+
+def _check_choice(model: str, name: str, value: str) -> None:
+    chosen = parameters(MODELS[model]).get(name)
+    if chosen is not None and chosen.file_kind and value:
+        return
+    menus = {each: p.choices for each, p in parameters(MODELS[model]).items() if p.choices is not None}
+    if name not in menus:
+        detail = f"is no menu of {model}, which has {among(menus)}"
+    elif value not in menus[name]:
+        detail = f"must be one of {among(menus[name])}, not {value[:40]!r}"
+    else:
+        return
+    raise InvalidDocument([FieldError(f"/choose/{escaped(name)}", detail)])

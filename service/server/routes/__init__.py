@@ -1,8 +1,7 @@
 """The endpoints: a handler parses, asks, answers. What they share is `service.server.state`.
 
 renders          renders over REST
-submission       how a request for a render becomes one that waits
-idempotency      requests that may be sent twice
+submission       how a request for a render becomes one that waits, also where it is sent twice
 batches          renders that differ along axes
 batch_files      the pictures of a batch in one file
 callbacks        which ends of renders and batches were told to whom
@@ -25,6 +24,5 @@ request_fields   what requests for renders and batches share, for the descriptio
 editor_files     the files of the page
 errors           errors as problem+json
 description      openapi.json
-examples         documents that the description shows
-example_answers  answers that it shows
+examples         documents and answers that the description shows
 """

@@ -24,7 +24,7 @@ from service.server.http.downloads import FileAnswer
 from service.server.requests.bodies import SMALL
 from service.server.routes import answers
 from service.server.routes.answers import Responses, reference
-from service.server.routes.example_answers import UPLOADED
+from service.server.routes.examples import UPLOADED
 from service.server.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
 

@@ -25,12 +25,11 @@ from service.server.batches.posing import with_poses
 from service.server.renders.store.batch_rows import BatchOrder
 from service.server.renders.store.record import IdempotencyKey
 from service.server.requests.batch_request import ParsedBatch
-from service.server.routes import answers, batch_files, idempotency, json_answers, waiting
+from service.server.routes import answers, batch_files, json_answers, submission, waiting
 from service.server.routes.errors import GONE
 from service.server.routes.examples import BATCH_ID
-from service.server.routes.idempotency import IdempotencyHeader
 from service.server.routes.renders import ImageQuery, Wait, lut_of
-from service.server.routes.submission import ID_BYTES, allowed
+from service.server.routes.submission import ID_BYTES, IdempotencyHeader, allowed
 from service.server.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.system.executors import storing
 from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE
@@ -85,12 +84,12 @@ class AnimationQuery(Shown):
 )
 async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> Response:
     state, owner = app_state(request), owner_of(request)
-    idempotency.check_key(state, idempotency_key)
+    submission.check_key(state, idempotency_key)
 
     async def ready(body: bytearray) -> None:
         if len(body) > MOST_BYTES:
             raise TooLarge(f"The body of a batch holds at most {MOST_BYTES // MIB} MiB: upload geometry as assets.")
-        if await idempotency.is_new(owner, idempotency_key, state.batches.keyed):
+        if await submission.is_new(owner, idempotency_key, state.batches.keyed):
             state.batches.admit(owner)
         await state.renderers.able(STARTING_S)
 
@@ -102,7 +101,7 @@ async def start(request: Request, idempotency_key: IdempotencyHeader = None) -> 
             return await _started(state, owner, posed, key)
 
         keyed = state.batches.keyed
-        found = await idempotency.once(state, "batch", owner, idempotency_key, parsed.digest, keyed, make)
+        found = await submission.once(state, "batch", owner, idempotency_key, parsed.digest, keyed, make)
     batch = state.batches.get(found, owner) if isinstance(found, str) else found
     document = {"id": batch.id, "renders": batch.order.renders}
     return JSONResponse(document, 202, {"location": f"batches/{batch.id}"})

@@ -13,7 +13,7 @@ from pydantic.json_schema import models_json_schema
 from service import document
 from service.document import axes
 from service.server.http.compression import Constant
-from service.server.routes import example_answers
+from service.server.routes import examples
 from service.server.routes.answers import PROBLEM, Problem
 from service.system.executors import answering
 
@@ -104,7 +104,7 @@ def _show(call: dict[str, Any]) -> None:
     """Put an example beside each answer that is text. A shape without a name has FastAPI's title, by which generated
     clients would name a type: it is left out."""
     for status, answer in call["responses"].items():
-        shown = example_answers.answer(call["operationId"], status) if status.startswith("2") else None
+        shown = examples.answer(call["operationId"], status) if status.startswith("2") else None
         for content in answer.get("content", {}).values():
             if content["schema"].get("title", "").startswith("Response "):
                 del content["schema"]["title"]

@@ -33,7 +33,7 @@ from service.server.renders.store.record import State
 from service.server.requests.request_parser import LONGEST_LABEL, unfolded
 from service.server.routes import answers, events, json_answers, submission, waiting
 from service.server.routes.errors import GONE
-from service.server.routes.idempotency import IdempotencyHeader
+from service.server.routes.submission import IdempotencyHeader
 from service.server.state import MOST_WAITS, app_state, caller_of, owner_of
 from service.system.executors import storing, writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat

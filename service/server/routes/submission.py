@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import time
-from collections.abc import AsyncIterator, Collection, Sequence
+import weakref
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
+from fastapi import Header
 from starlette.requests import Request
 
 from service.document.quality import ResolvedSettings
 from service.pack import Packed
-from service.problems import ServiceError
+from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
 from service.server.renders.render import Render
 from service.server.renders.status import status
 from service.server.renders.store.record import IdempotencyKey, Order, StoredRender
 from service.server.requests.parsers import Kind
 from service.server.requests.request_parser import ParsedRequest
-from service.server.routes import idempotency
 from service.server.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.server.storage.asset_access import NO_USES, AllowedUses, Use
 from service.server.storage.quota import Quota
@@ -51,13 +53,13 @@ async def unlisted(
 async def submitted(request: Request, key: str | None) -> Render | dict[str, Any]:
     """A queued render, or the earlier one with this idempotency key: its status where it is gone."""
     began, state, owner = time.monotonic(), app_state(request), owner_of(request)
-    idempotency.check_key(state, key)
+    check_key(state, key)
     async with _parsed(request, "render" if key is None else "keyed_render", key) as parsed:
 
         async def make(taken: IdempotencyKey | None) -> Render:
             return await _submitted(state, parsed, owner, began, taken)
 
-        found = await idempotency.once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
+        found = await once(state, "render", owner, key, parsed.digest, partial(_keyed, state), make)
         return _known(state, found, parsed) if isinstance(found, StoredRender) else found
 
 
@@ -70,7 +72,7 @@ def _parsed(request: Request, kind: Kind, key: str | None = None) -> AbstractAsy
     state, owner = app_state(request), owner_of(request)
 
     async def ready(body: bytearray) -> None:
-        if await idempotency.is_new(owner, key, partial(_keyed, state)):
+        if await is_new(owner, key, partial(_keyed, state)):
             state.render_queue.admit(owner)
         await state.renderers.able(STARTING_S)
 
@@ -130,3 +132,50 @@ async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
         yield
     finally:
         await opening(partial(pin.__exit__, None, None, None))
+
+
+LONGEST_KEY = 200  # characters
+IdempotencyHeader = Annotated[
+    str | None, Header(description=f"1 to {LONGEST_KEY} characters, the caller's own name for this.")
+]
+
+T = TypeVar("T")
+U = TypeVar("U")
+Find = Callable[[str, str], Awaitable[tuple[str, U] | None]]  # by owner and key: the digest, and what was made
+
+_turns: weakref.WeakValueDictionary[tuple[int, str, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
+
+
+def check_key(state: AppState, key: str | None) -> None:
+    """Raise InvalidDocument for a key that cannot be one, Unavailable where none can be remembered."""
+    if key is None:
+        return
+    if not 1 <= len(key) <= LONGEST_KEY:
+        raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
+    if state.render_queue.store is None:
+        raise Unavailable("Idempotency-Key needs the data folder, which cannot be written to.", 60)
+
+
+async def is_new(owner: str, key: str | None, find: Find[U]) -> bool:
+    """Whether the request needs room: a repetition does not."""
+    return key is None or await find(owner, key) is None
+
+
+async def once(
+    state: AppState, kind: str, owner: str, key: str | None, digest: str, find: Find[U],
+    make: Callable[[IdempotencyKey | None], Awaitable[T]],
+) -> T | U:  # fmt: skip
+    """What `make` makes of the first request of this kind, owner and key, and what `find` finds for the others.
+
+    Of several at once the others wait until the first is accepted or refused. Raises Conflict where the key was used
+    for a request with another digest."""
+    if key is None:
+        return await make(None)
+    async with _turns.setdefault((id(state), kind, owner, key), asyncio.Lock()):
+        found = await find(owner, key)
+        if found is None:
+            return await make(IdempotencyKey(key, digest))
+    known, earlier = found
+    if known != digest:
+        raise Conflict("This Idempotency-Key was used for another request.")
+    return earlier

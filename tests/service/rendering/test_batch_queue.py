@@ -16,7 +16,7 @@ import pytest
 from service.config import MIB, Config
 from service.problems import MISTAKE, NotFound, TooLarge, TooManyRequests
 from service.server.batches.batch import Batch, member_id
-from service.server.batches.members import Members as RealMembers
+from service.server.batches.batch import Members as RealMembers
 from service.server.batches.queue import BatchQueue
 from service.server.renders.queue import RenderQueue
 from service.server.renders.render import Render

@@ -86,7 +86,7 @@ def test_nothing_else_gives_way() -> None:
     assert found == {
         "system/cpu.py",
         "system/executors.py",
-        "system/confined/limits.py",
+        "system/confined/child.py",
         "worker/__main__.py",
         "worker/helpers/compile_main.py",  # what is compiled ahead
         "worker/helpers/denoise_main.py",  # for which no first frame waits
