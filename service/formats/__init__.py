@@ -7,6 +7,7 @@ source        the bytes of an upload, in memory or in a file
 cache         parsed assets in memory, and what is said of one: size, bounds, warnings
 scene_import  a whole scene's file -> a document whose references are assets
 sandbox       the child process that parses
+surface       what the inputs of surface models mean, for all formats
 read          readers of single formats, and importers of whole scenes
 images        pixels -> files
 """

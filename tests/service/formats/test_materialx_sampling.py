@@ -6,7 +6,7 @@ import numpy as np
 
 from service.formats import ImageData
 from service.formats.read.materialx.evaluation import sampled
-from service.formats.read.materialx.trees import Tree
+from service.formats.surface.trees import Tree
 
 PIXELS = np.random.default_rng(5).integers(0, 256, (2, 2, 3), np.uint8)
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from service.formats.read.materialx.images import Images, texels_of
 from service.formats.read.materialx.operations import OPERATIONS, WEIGHTS
-from service.formats.read.materialx.trees import Tree, Unsupported, walk
+from service.formats.surface import trees
+from service.formats.surface.trees import CLOSE, PROBES, Tree, Unsupported, walk
 from service.formats.types import Doubles, Floats, ImageData
 
-PROBES = 6
-CLOSE = 1e-5  # by how much a probe may differ from a linear function; single precision is 100 times as fine
 SOBEL = 1 / 16  # the scale of `heighttonormal`, as the library's GLSL has it
 GEOMETRY = ("position", "normal", "tangent", "bitangent", "viewdirection", "geomcolor")
 FRAME = {"tangent": (1.0, 0.0, 0.0), "bitangent": (0.0, 1.0, 0.0), "normal": (0.0, 0.0, 1.0)}
@@ -46,7 +45,7 @@ class Places:
 
     def _evaluated(self, tree: Tree) -> Floats:
         if tree.value is not None:
-            return tree.value[None, :]
+            return tree.value[None, :].astype(np.float32)
         if tree.operation == "texcoord":
             return self.uv if tree.size == 2 else np.pad(self.uv, ((0, 0), (0, tree.size - 2)))
         if tree.operation == "position":  # on the square of the texture
@@ -200,16 +199,12 @@ def scaled(position: Tree) -> float | None:
 def factors(tree: Tree, image: Tree) -> tuple[Doubles, list[int]] | None:
     """For a tree that reads one image alone and multiplies its channels: the factor of each of its numbers, and the
     channel; None where it does something else."""
-    probes = np.concatenate([np.eye(4), np.zeros((1, 4)), np.random.default_rng(2).uniform(0, 1, (PROBES, 4))])
-    places = Places(np.zeros((len(probes), 2), np.float32), texels={id(image): probes.astype(np.float32)})
-    found = np.broadcast_to(places.value(tree), (len(probes), tree.size)).astype(np.float64)
-    matrix = found[:4]  # (channel, number)
-    if not np.isfinite(found).all() or np.abs(found - probes @ matrix).max() > CLOSE * (1 + np.abs(matrix).max()):
-        return None
-    channels = np.abs(matrix).argmax(axis=0)
-    if np.count_nonzero(np.abs(matrix) > CLOSE, axis=0).max() > 1:
-        return None
-    return matrix[channels, range(tree.size)], [int(one) for one in channels]
+
+    def values(texels: Doubles) -> Floats:
+        place = np.zeros((len(texels), 2), np.float32)
+        return Places(place, texels={id(image): texels.astype(np.float32)}).value(tree)
+
+    return trees.factors(tree.size, 4, values)
 
 
 def bands(width: int, height: int, rows: int) -> Iterator[tuple[slice, Floats]]:

@@ -13,8 +13,8 @@ import numpy as np
 from service.formats.errors import ParseError
 from service.formats.read.materialx.evaluation import fixed, scaled
 from service.formats.read.materialx.images import Images
-from service.formats.read.materialx.trees import Tree, Unsupported, applied, constant, times, walk
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.surface.trees import Tree, Unsupported, applied, constant, times, walk
 
 MOST_TREES = 20_000
 MOST_DEPTH = 150  # of nodes within nodes

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from service.formats.formats import KINDS, sniff
 from service.formats.read.image import parse_image
-from service.formats.read.materialx.trees import Unsupported
 from service.formats.read.obj.paths import is_absolute
+from service.formats.surface.trees import Unsupported
 from service.formats.types import AssetLimits, Floats, ImageData
 
 FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"

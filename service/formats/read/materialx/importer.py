@@ -10,13 +10,13 @@ from service.formats.errors import ParseError
 from service.formats.read.materialx.document import check_library, read_document
 from service.formats.read.materialx.graph import Graphs
 from service.formats.read.materialx.images import Images
-from service.formats.read.materialx.models import MODELS
 from service.formats.read.materialx.surface import Surface
-from service.formats.read.materialx.trees import Unsupported, times
 from service.formats.read.materialx.values import Values
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.surface import MODELS
+from service.formats.surface.trees import Unsupported, times
 from service.formats.types import AssetLimits, SceneFile
 
 SUFFIX = ".mtlx"
@@ -100,7 +100,7 @@ class _Reading:
         if shader.getCategory() != "displacement" or moved is None or moved.getType() != "float":
             self.notes.add(place, "displacement other than along the normal is not supported and is left out")
             return
-        surface.height(times(graphs.input(shader, "displacement"), graphs.input(shader, "scale")), place)
+        surface.raise_by(times(graphs.input(shader, "displacement"), graphs.input(shader, "scale")), place)
 
     def _add(self, material: Any, shader: Any, graphs: Graphs) -> None:
         model, place = MODELS.get(shader.getCategory()), graphs.place(shader.getNamePath())

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 from service.formats.read.materialx import noise
-from service.formats.read.materialx.trees import LUMINANCE, Tree, Unsupported
+from service.formats.surface import trees
+from service.formats.surface.trees import LUMINANCE, TINY, Operation, Tree, Unsupported, Values
 from service.formats.types import Floats
-
-TINY = np.float32(1e-8)
-Values = dict[str, Floats]
-Operation = Callable[[Values, Tree], Any]
 
 
 def _shares(v: Values, blended: Callable[[Floats, Floats], Any]) -> Any:
@@ -37,10 +34,6 @@ def _length(a: Floats) -> Any:
 def _normalized(v: Values, tree: Tree) -> Any:
     length = _length(v["in"])
     return v["in"] / np.where(length > 0, length, 1)
-
-
-def _dot(v: Values, tree: Tree) -> Any:
-    return (v["in1"] * v["in2"]).sum(axis=1, keepdims=True)
 
 
 def _combined(v: Values, tree: Tree) -> Any:
@@ -167,41 +160,29 @@ def _modulo(v: Values, tree: Tree) -> Any:
     return v["in1"] - by * np.floor(v["in1"] / by)
 
 
-def _plain(function: Callable[..., Any], *names: str) -> Operation:
-    return lambda v, tree: function(*(v[name] for name in names))
-
-
 OPERATIONS: dict[str, Operation] = {
-    "add": _plain(np.add, "in1", "in2"),
-    "subtract": _plain(np.subtract, "in1", "in2"),
-    "multiply": _plain(np.multiply, "in1", "in2"),
-    "divide": lambda v, tree: v["in1"] / np.where(v["in2"] == 0, TINY, v["in2"]),
+    **trees.OPERATIONS,
     "modulo": _modulo,
-    "power": lambda v, tree: np.power(np.maximum(v["in1"], 0), v["in2"]),
-    "min": _plain(np.minimum, "in1", "in2"),
-    "max": _plain(np.maximum, "in1", "in2"),
-    "clamp": lambda v, tree: np.minimum(np.maximum(v["in"], v["low"]), v["high"]),
-    "invert": _plain(np.subtract, "amount", "in"),
-    "absval": _plain(np.abs, "in"),
+    "min": trees.plain(np.minimum, "in1", "in2"),
+    "max": trees.plain(np.maximum, "in1", "in2"),
+    "invert": trees.plain(np.subtract, "amount", "in"),
     "fract": lambda v, tree: v["in"] - np.floor(v["in"]),
-    "floor": _plain(np.floor, "in"),
-    "ceil": _plain(np.ceil, "in"),
+    "floor": trees.plain(np.floor, "in"),
+    "ceil": trees.plain(np.ceil, "in"),
     "round": lambda v, tree: np.floor(v["in"] + 0.5),
-    "sign": _plain(np.sign, "in"),
-    "sin": _plain(np.sin, "in"),
-    "cos": _plain(np.cos, "in"),
-    "tan": _plain(np.tan, "in"),
+    "sign": trees.plain(np.sign, "in"),
+    "sin": trees.plain(np.sin, "in"),
+    "cos": trees.plain(np.cos, "in"),
+    "tan": trees.plain(np.tan, "in"),
     "asin": lambda v, tree: np.arcsin(np.clip(v["in"], -1, 1)),
     "acos": lambda v, tree: np.arccos(np.clip(v["in"], -1, 1)),
-    "atan2": _plain(np.arctan2, "iny", "inx"),
+    "atan2": trees.plain(np.arctan2, "iny", "inx"),
     "sqrt": lambda v, tree: np.sqrt(np.maximum(v["in"], 0)),
     "ln": lambda v, tree: np.log(np.maximum(v["in"], TINY)),
-    "exp": _plain(np.exp, "in"),
+    "exp": trees.plain(np.exp, "in"),
     "normalize": _normalized,
     "magnitude": lambda v, tree: _length(v["in"]),
-    "dotproduct": _dot,
     "crossproduct": lambda v, tree: np.cross(v["in1"], v["in2"]),
-    "largest": lambda v, tree: v["in"].max(axis=1, keepdims=True),
     "rotate2d": _rotated,
     "rotate3d": _rotated_about,
     "transformmatrix": _matrix,
@@ -209,8 +190,8 @@ OPERATIONS: dict[str, Operation] = {
     "combine3": _combined,
     "combine4": _combined,
     "extract": _extracted,
-    "convert": _plain(np.array, "in"),
-    "dot": _plain(np.array, "in"),
+    "convert": trees.plain(np.array, "in"),
+    "dot": trees.plain(np.array, "in"),
     "remap": lambda v, tree: (
         v["outlow"] + (v["in"] - v["inlow"]) * (v["outhigh"] - v["outlow"]) / (v["inhigh"] - v["inlow"])
     ),
@@ -220,7 +201,6 @@ OPERATIONS: dict[str, Operation] = {
     "hsvtorgb": _rgb,
     "premult": _premultiplied,
     "unpremult": _unpremultiplied,
-    "mix": lambda v, tree: v["bg"] * (1 - v["mix"]) + v["fg"] * v["mix"],
     "plus": lambda v, tree: _shares(v, lambda b, f: b + f),
     "minus": lambda v, tree: _shares(v, lambda b, f: b - f),
     "difference": lambda v, tree: _shares(v, lambda b, f: np.abs(b - f)),
@@ -231,10 +211,9 @@ OPERATIONS: dict[str, Operation] = {
     "mask": lambda v, tree: _shares(v, lambda b, f: b * f[:, 3:]),
     "out": lambda v, tree: _shares(v, lambda b, f: f * (1 - b[:, 3:])),
     "over": lambda v, tree: _shares(v, lambda b, f: f + b * (1 - f[:, 3:])),
-    "inside": _plain(np.multiply, "in", "mask"),
+    "inside": trees.plain(np.multiply, "in", "mask"),
     "outside": lambda v, tree: v["in"] * (1 - v["mask"]),
     "ifgreater": _chosen(np.greater),
-    "ifgreatereq": _chosen(np.greater_equal),
     "ifequal": _chosen(np.equal),
     "and": lambda v, tree: (v["in1"] > 0) & (v["in2"] > 0),
     "or": lambda v, tree: (v["in1"] > 0) | (v["in2"] > 0),

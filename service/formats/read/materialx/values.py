@@ -26,10 +26,10 @@ from service.formats.read.materialx.evaluation import (
     reads,
 )
 from service.formats.read.materialx.images import Images, srgb_bytes, texels_of
-from service.formats.read.materialx.trees import Tree, Unsupported, constant, less, walk
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.surface.trees import Tree, Unsupported, constant, less, walk
 from service.formats.types import Doubles, Floats
 
 BAND = 1 << 15  # texels at a time

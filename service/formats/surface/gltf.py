@@ -1,0 +1,127 @@
+"""`gltf_pbr` as `principled`: the metallic-roughness model of glTF 2.0 with its ratified extensions.
+
+glTF's own files give two inputs that MaterialX' node lacks: the share of diffuse light that goes through a surface,
+and its colour.
+"""
+
+from __future__ import annotations
+
+import math
+
+from service.formats.surface import parts
+from service.formats.surface.inputs import TANGENT, Inputs
+from service.formats.surface.plain import Default
+from service.formats.surface.trees import clamped, constant, mixed, quotient, raised, times
+
+WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+DEFAULTS: dict[str, Default] = {
+    "base_color": WHITE, "metallic": 1.0, "roughness": 1.0, "normal": None, "tangent": None, "occlusion": 1.0,
+    "transmission": 0.0, "specular": 1.0, "specular_color": WHITE, "ior": 1.5, "alpha": 1.0, "alpha_mode": 0.0,
+    "alpha_cutoff": 0.5, "iridescence": 0.0, "iridescence_ior": 1.3, "iridescence_thickness": 100.0,
+    "sheen_color": BLACK, "sheen_roughness": 0.0, "clearcoat": 0.0, "clearcoat_roughness": 0.0,
+    "clearcoat_normal": None, "emissive": BLACK, "emissive_strength": 1.0, "thickness": 0.0,
+    "attenuation_distance": 0.0, "attenuation_color": WHITE, "anisotropy_strength": 0.0, "anisotropy_rotation": 0.0,
+    "dispersion": 0.0, "diffuse_transmission": 0.0, "diffuse_transmission_color": WHITE,
+}  # fmt: skip
+OPAQUE, MASK, BLEND = range(3)  # values of alpha_mode
+SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1
+
+
+def gltf_pbr(s: Inputs) -> None:
+    s.put("base_color", "base_color", s.tree("base_color"))
+    s.put("metallic", "metallic", s.tree("metallic"), 0.0)
+    _roughness(s)
+    _specular(s)
+    is_body = s.is_used("thickness", 0)
+    s.put("transmission", "transmission", s.tree("transmission"), 0.0)
+    if s.is_used("transmission", 0):
+        _inside(s, is_body)
+    _through(s, is_body)
+    color = s.tree("sheen_color")
+    if not s.is_black(color):
+        parts.sheen(s, constant(1.0), color, s.tree("sheen_roughness"), "sheen_color")
+    parts.coat(s, "clearcoat", "clearcoat_roughness", normal="clearcoat_normal")
+    parts.film(s, "iridescence_thickness", "iridescence_ior", "iridescence")
+    finish(s)
+    s.lose([parts.OCCLUSION])
+    if s.is_given("tangent"):
+        s.note("tangent", TANGENT)
+
+
+def finish(s: Inputs) -> None:
+    """What glTF's older model of specular and glossiness has as well: emission, opacity and normals."""
+    parts.emission(s, times(s.tree("emissive"), s.tree("emissive_strength")), "emissive")
+    mode = int(s.number("alpha_mode", OPAQUE))
+    if mode != OPAQUE:
+        s.put("alpha", "alpha", s.tree("alpha"), 1.0)
+    cutoff = s.constant("alpha_cutoff")
+    if mode == MASK and cutoff is not None and cutoff[0] > 1:
+        s.material["alpha"] = 0.0
+    elif mode == MASK:
+        s.put("alpha_cutoff", "alpha_cutoff", s.tree("alpha_cutoff"))
+    s.normal("normal_map", "normal")
+
+
+def _roughness(s: Inputs) -> None:
+    """Alpha along the tangent is mix(r^2, 1, strength^2), across it r^2; ours is stretched both ways."""
+    roughness, strength = s.tree("roughness"), s.tree("anisotropy_strength")
+    if not s.is_used("anisotropy_strength", 0):
+        s.put("roughness", "roughness", roughness)
+        return
+    turn = times(s.tree("anisotropy_rotation"), 180 / math.pi)
+    s.put("anisotropic_rotation", "anisotropy_rotation", turn, 0.0)
+    if s.computes or not any(s.fixed(each) is None for each in (roughness, strength)):
+        alpha = clamped(raised(roughness, 2.0), 1e-4, 1.0)
+        along = mixed(alpha, constant(1.0), times(strength, strength))
+        s.put("roughness", "roughness", raised(times(along, alpha), 0.25))
+        parts.stretched(s, "anisotropy_strength", quotient(alpha, along))
+        return
+    s.put("roughness", "roughness", roughness)
+    s.note("anisotropy_strength", "under a texture, anisotropy stretches the highlight in both directions, not one")
+    most = s.most("anisotropy_strength")[0]  # whose square times the texture is near to the square of both
+    s.put("anisotropic", "anisotropy_strength", times(strength, float(most)))
+
+
+def _specular(s: Inputs) -> None:
+    """F0 is that of the index times a weight and a colour, which beyond 1 needs a higher index."""
+    color = s.tree("specular_color")
+    beyond = max(1.0, *map(float, s.most("specular_color")))
+    if s.is_given("specular_color"):
+        s.put("specular_color", "specular_color", times(color, 1 / beyond), 1.0)
+    strength = times(s.tree("specular"), beyond)
+    if beyond == 1 and not s.is_used("specular", 1):
+        if s.is_given("ior"):
+            s.put("ior", "ior", s.tree("ior"))
+        return
+    if s.is_used("specular", 1) and not s.is_black(strength) and not s.is_used("transmission", 0):
+        detail = "the weight lowers the reflection seen head-on only; at grazing angles it stays as it is"
+        s.note("specular", detail)
+    parts.dielectric(s, "ior", strength, "specular", "transmission")
+
+
+def _inside(s: Inputs, is_body: bool) -> None:
+    """What passes a surface goes through a body that has a thickness, else through a thin wall."""
+    if not is_body:
+        s.material["thin_walled"] = True
+        return
+    if s.is_used("dispersion", 0) and (share := s.number("dispersion", 0)) > 0:
+        parts.abbe(s, SHOWN_ABBE / share)
+    distance = s.constant("attenuation_distance")
+    if distance is not None and distance[0] > 0:
+        s.put("attenuation_distance", "attenuation_distance", constant(distance[0]))
+        s.put("attenuation_color", "attenuation_color", s.tree("attenuation_color"))
+
+
+def _through(s: Inputs, is_body: bool) -> None:
+    """Diffuse light that goes through a thin wall."""
+    name = "diffuse_transmission"
+    if not s.is_given(name) or not s.is_used(name, 0):
+        return
+    if is_body and "transmission" in s.material:
+        s.note(name, "beside a body of glass diffuse transmission is left out")
+        return
+    if is_body:
+        s.note(name, "light does not travel inside the body; its surfaces are thin walls")
+    s.material["thin_walled"] = True
+    s.put(name, name, s.tree(name))
+    s.put(f"{name}_color", f"{name}_color", s.tree(f"{name}_color"))

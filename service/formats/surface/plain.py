@@ -1,0 +1,133 @@
+"""Inputs that are numbers, colours and references to textures: of formats whose files compute nothing else."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from service.formats.surface.inputs import Inputs
+from service.formats.surface.trees import Tree, Unsupported, constant, factors, times, value, walk
+from service.formats.types import Doubles
+
+Default = float | tuple[float, float, float] | None  # None: a direction, which the surface gives
+Given = float | tuple[float, ...] | dict[str, Any]
+
+NEAREST = "what is computed of this texture is not supported; it is scaled to what that is where the texture is white"
+
+
+@dataclass(eq=False)
+class Texture(Tree):
+    """A texture of the document, and how a parameter refers to it."""
+
+    reference: dict[str, Any] = field(default_factory=dict)
+
+
+class PlainInputs(Inputs):
+    """`defaults` has each input of the model. A texture times a number stays a texture; of another formula there is
+    what it is where the texture is white."""
+
+    computes = False
+    defaults: Mapping[str, Default]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._trees: dict[str, Tree] = {}
+
+    @abstractmethod
+    def given(self, name: str, default: Default) -> Given | None:
+        """A number, a colour or a reference to a texture; None for the default."""
+
+    @abstractmethod
+    def is_textured(self, name: str) -> bool:
+        """Whether an input differs from place to place. It is asked of inputs that may not be read at all."""
+
+    def tree(self, name: str) -> Tree:
+        if name not in self._trees:
+            default = self.defaults[name]
+            found = self.given(name, default)
+            size = 3 if isinstance(default, tuple) else 1
+            if isinstance(found, dict):
+                reference = dict(found)
+                factor = reference.pop("factor", 1.0)
+                by = constant(*factor) if isinstance(factor, list) else constant(factor)
+                self._trees[name] = times(Texture("texture", size, reference=reference), by)
+            else:
+                plain = default if found is None else found
+                numbers = plain if isinstance(plain, tuple) else (plain or 0.0,) * size
+                self._trees[name] = constant(*numbers[:size])
+        return self._trees[name]
+
+    def constant(self, name: str) -> list[float] | None:
+        return None if self.is_textured(name) else super().constant(name)
+
+    def fixed(self, tree: Tree) -> Any:
+        return None if _textures(tree) else value(tree, {})[0]
+
+    def most(self, name: str) -> Any:
+        return self._white(self.tree(name))
+
+    def _white(self, tree: Tree) -> Any:
+        return value(tree, {id(one): np.ones((1, one.size)) for one in _textures(tree)})[0]
+
+    def direction(self, name: str) -> tuple[float, float] | None:
+        return None if self.is_given(name) else (1.0, 0.0)
+
+    def height(self, name: str) -> None:
+        if self.is_textured(name):
+            self.note(name, "displacement is not read")
+
+    def value(self, tree: Tree, name: str, low: float, high: float, is_color: bool) -> Any:
+        found = self.fixed(tree)
+        if found is not None:
+            return self._number(self._within(found, name, low, high), is_color)
+        first, *others = _textures(tree)
+        by = self._factors(tree, first, others)
+        if by is None or others:
+            self.note(name, NEAREST)
+        if by is None:
+            by = self._white(tree)
+        if not np.abs(by).max():
+            return self._number(by, is_color)
+        return first.reference | self.scale(self._number(self._within(by, name, 0.0, high), is_color))
+
+    def _factors(self, tree: Tree, texture: Texture, others: list[Texture]) -> Any:
+        """(size,) what the channels of a texture are multiplied by, where the others are white; None where it is
+        something else. A number of a colour's texture is read as that of a grey one."""
+        channels = texture.size if tree.size == texture.size else 1
+        white = {id(one): np.ones((1, one.size)) for one in others}
+
+        def values(texels: Doubles) -> Any:
+            return value(tree, white | {id(texture): np.repeat(texels, texture.size // channels, axis=1)})
+
+        found = factors(tree.size, channels, values)
+        if found is None:
+            return None
+        by, picked = found
+        is_whole = all(k % channels == picked[k] for k in range(tree.size) if by[k])
+        return by if is_whole else None
+
+    def scale(self, factor: Any) -> dict[str, Any]:
+        """The member of a reference that says its factor."""
+        return {} if factor == 1 else {"factor": factor}
+
+    def _number(self, values: Any, is_color: bool) -> Any:
+        numbers = [float(one) for one in values]
+        return numbers[0] if not is_color or len(set(numbers)) == 1 else numbers
+
+    def _within(self, values: Any, name: str, low: float, high: float) -> Any:
+        if not np.isfinite(values).all():
+            raise Unsupported("its value is not a finite number")
+        inside = np.clip(values, low, high)
+        if np.abs(inside - values).max() > 1e-6:
+            nearest = ", ".join(f"{one:g}" for one in sorted(set(inside[inside != values].tolist())))
+            self.note(name, f"values beyond {low:g}..{high:g} are not supported; {nearest} is used instead")
+        return inside
+
+
+def _textures(tree: Tree) -> list[Texture]:
+    """Those that a tree reads, each once."""
+    return [one for one in walk(tree) if isinstance(one, Texture)]
