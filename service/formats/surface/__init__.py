@@ -13,19 +13,26 @@ plain     inputs that are numbers, colours and textures
 trees     formulas that hold for numbers and for textures
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
-from service.formats.surface.disney import disney_principled
-from service.formats.surface.gltf import gltf_pbr
+from service.formats.surface import disney, gltf, open_pbr, preview, standard
 from service.formats.surface.inputs import Inputs
-from service.formats.surface.open_pbr import open_pbr_surface
-from service.formats.surface.preview import usd_preview_surface
-from service.formats.surface.standard import standard_surface
+from service.formats.surface.plain import Default
 
-MODELS: dict[str, Callable[[Inputs], None]] = {
-    "standard_surface": standard_surface,
-    "open_pbr_surface": open_pbr_surface,
-    "gltf_pbr": gltf_pbr,
-    "UsdPreviewSurface": usd_preview_surface,
-    "disney_principled": disney_principled,
+
+@dataclass(frozen=True)
+class Model:
+    """A surface model: what it makes of its inputs, and their defaults."""
+
+    read: Callable[[Inputs], None]
+    defaults: Mapping[str, Default]
+
+
+MODELS: dict[str, Model] = {
+    "standard_surface": Model(standard.standard_surface, standard.DEFAULTS),
+    "open_pbr_surface": Model(open_pbr.open_pbr_surface, open_pbr.DEFAULTS),
+    "gltf_pbr": Model(gltf.gltf_pbr, gltf.DEFAULTS),
+    "UsdPreviewSurface": Model(preview.usd_preview_surface, preview.DEFAULTS),
+    "disney_principled": Model(disney.disney_principled, disney.DEFAULTS),
 }

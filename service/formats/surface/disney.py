@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from service.formats.surface.inputs import Inputs
+from service.formats.surface.plain import Default
 
 # Parameters that are inputs of another name, and their defaults.
 SAME: dict[str, tuple[str, float | None]] = {
@@ -12,6 +13,11 @@ SAME: dict[str, tuple[str, float | None]] = {
     "subsurface": ("subsurface", 0.0), "transmission": ("specTrans", 0.0),
     # Both stretch by 1 - 0.9 a; the library's implementation of it has another form of the same idea.
     "anisotropic": ("anisotropic", 0.0),
+}  # fmt: skip
+DEFAULTS: dict[str, Default] = {
+    "baseColor": (0.16,) * 3, "metallic": 0.0, "roughness": 0.5, "anisotropic": 0.0, "specular": 0.5,
+    "specularTint": 0.0, "sheen": 0.0, "sheenTint": 0.5, "clearcoat": 0.0, "clearcoatGloss": 1.0, "specTrans": 0.0,
+    "ior": 1.5, "subsurface": 0.0,
 }  # fmt: skip
 
 

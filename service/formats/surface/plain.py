@@ -31,10 +31,10 @@ class PlainInputs(Inputs):
     what it is where the texture is white."""
 
     computes = False
-    defaults: Mapping[str, Default]
 
-    def __init__(self) -> None:
+    def __init__(self, defaults: Mapping[str, Default]) -> None:
         super().__init__()
+        self.defaults = defaults
         self._trees: dict[str, Tree] = {}
 
     @abstractmethod

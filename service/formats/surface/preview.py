@@ -64,5 +64,5 @@ def _opacity(s: Inputs) -> None:
         detail = "under a texture, a transparent surface is one that rays meet less often, without highlights"
         s.note("opacity", detail)
     s.put("alpha", "opacity", s.tree("opacity"), 1.0)
-    if threshold > 0:
+    if threshold > 0 and "alpha" in s.material:
         s.put("alpha_cutoff", "opacityThreshold", constant(threshold))

@@ -9,8 +9,10 @@ import pytest
 
 from service.colorimetry import decode_srgb, encode_srgb
 from service.document import parse_scene
+from service.document.material import OpenpbrMaterial
 from service.formats.scene_import import Imported
 from service.server.assets import AssetStore
+from tests.mtlx_files import mtlx, surface, taken, value
 from tests.usd_files import PNG, QUAD, material, mesh, texture, usda, usdz
 
 pytestmark = [pytest.mark.usd, pytest.mark.slow]
@@ -26,10 +28,10 @@ UV = """
 
 
 def worn(
-    store: AssetStore, look: str, images: dict[str, np.ndarray] | None = None
+    store: AssetStore, look: str, images: dict[str, np.ndarray] | None = None, unit: float = 1
 ) -> tuple[dict[str, Any], Imported]:
-    """The material "Look" in the document, on a square."""
-    root = usda(look + mesh("Sign", "rel material:binding = </Look>", body=QUAD + UV))
+    """The material "Look" in the document, on a square; `unit` is how many metres a unit of the stage has."""
+    root = usda(look + mesh("Sign", "rel material:binding = </Look>", body=QUAD + UV), f"metersPerUnit = {unit:g}")
     data = usdz({"root.usda": root} | {name: PNG(pixels) for name, pixels in (images or {}).items()})
     found = store.scene(store.add(data).id)
     parse_scene(found.scene({"type": "constant", "radiance": 1}))
@@ -217,9 +219,29 @@ def test_standard_surface_and_openpbr(store: AssetStore) -> None:
     assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:diffuse_roughness"]
     glass = material("Look", OPEN_PBR, kind="ND_open_pbr_surface_surfaceshader", output="mtlx:surface")
     found, scene = worn(store, glass)
-    assert found["transmission"] == 1 and found["ior"] == pytest.approx(1.33)
-    assert found["attenuation_distance"] == 0.5 and found["attenuation_color"] == [0.2, 0.9, 0.4]
-    assert found["base_color"] == [1, 1, 1] and not scene.warnings
+    assert found["type"] == "openpbr" and not scene.warnings
+    assert (found["transmission_weight"], found["transmission_depth"], found["specular_ior"]) == (1, 0.5, 1.33)
+    assert found["transmission_color"] == [0.2, 0.9, 0.4] and found["base_color"] == [0.8, 0.4, 0.2]
+
+
+def test_openpbr_has_the_numbers_that_a_mtlx_has(store: AssetStore) -> None:
+    pytest.importorskip("MaterialX")
+    given: dict[str, Any] = {
+        "base_weight": 0.9, "base_color": [0.5, 0.25, 0.75], "base_metalness": 0.5, "specular_weight": 1.5,
+        "specular_ior": 0.75, "specular_roughness_anisotropy": 0.6, "transmission_weight": 0.25,
+        "transmission_depth": 2.0, "transmission_scatter": [0.25, 0.5, 0.75], "coat_weight": 0.5, "coat_ior": 1.7,
+        "transmission_dispersion_scale": 0.5, "fuzz_weight": 0.2, "fuzz_color": [0.5, 0.5, 0.5],
+        "thin_film_weight": 0.25, "thin_film_thickness": 0.35, "subsurface_weight": 0.5, "subsurface_radius": 0.125,
+        "subsurface_radius_scale": [1.0, 0.25, 0.125], "subsurface_scatter_anisotropy": -0.5,
+        "emission_luminance": 500.0, "emission_color": [0.5, 2.0, 1.0], "geometry_opacity": 0.8,
+    }  # fmt: skip
+    lines = [f"{'color3f' if isinstance(each, list) else 'float'} inputs:{name} = "
+             f"{tuple(each) if isinstance(each, list) else each}" for name, each in given.items()]  # fmt: skip
+    kind = "ND_open_pbr_surface_surfaceshader"
+    found, scene = worn(store, material("Look", "\n".join(lines), kind=kind, output="mtlx:surface"))
+    text = mtlx(surface("open_pbr_surface", *(value(name, each) for name, each in given.items())))
+    (other,) = taken(store, text).document["materials"].values()
+    assert OpenpbrMaterial.model_validate(found) == OpenpbrMaterial.model_validate(other) and not scene.warnings
 
 
 def test_films_dispersion_and_thin_walls_of_materialx(store: AssetStore) -> None:
@@ -232,13 +254,12 @@ def test_films_dispersion_and_thin_walls_of_materialx(store: AssetStore) -> None
     film = (
         "float inputs:thin_film_weight = {}; float inputs:thin_film_thickness = 0.35; float inputs:thin_film_ior = 2"
     )
-    found, told = read(film.format(1), "open_pbr_surface")
-    assert (found["film_thickness"], found["film_ior"], told) == (350, 2, [])
     found, told = read(film.format(0.25), "open_pbr_surface")
-    assert "film_thickness" not in found and told == ["/Look/S.inputs:thin_film_weight"]
+    assert [found[f"thin_film_{name}"] for name in ("weight", "thickness", "ior")] == [0.25, 0.35, 2] and not told
     glass = "float inputs:transmission_weight = 1; float inputs:transmission_dispersion_scale = 0.5"
     found, told = read(glass, "open_pbr_surface")
-    assert (found["abbe"], told) == (40, [])
+    names = ("transmission_dispersion_scale", "transmission_dispersion_abbe_number")
+    assert ([found[name] for name in names], told) == ([0.5, 20], [])
     found, told = read("float inputs:transmission = 1; float inputs:transmission_dispersion = 33", "standard_surface")
     assert (found["abbe"], told) == (33, [])
     pane = "float inputs:transmission = 1; bool inputs:thin_walled = 1; float inputs:transmission_depth = 2"
@@ -253,31 +274,66 @@ def test_films_dispersion_and_thin_walls_of_materialx(store: AssetStore) -> None
         "color3f inputs:subsurface_color = (1, 1, 0); color3f inputs:base_color = (0, 0.2, 0.4)"
     )
     found, told = read(paper, "open_pbr_surface")
-    assert (found["diffuse_transmission"], told) == (0.25, [])
-    # What comes back: half of it the base's, and of the other half one in two.
-    back = np.array([0, 0.2, 0.4]) * 0.5 + np.array([1, 1, 0]) * 0.25
-    assert 0.75 * np.array(found["base_color"]) == pytest.approx(back)
+    assert (found["geometry_thin_walled"], found["subsurface_weight"], told) == (True, 0.5, [])
+    assert found["subsurface_color"] == [1, 1, 0] and found["base_color"] == [0, 0.2, 0.4]
 
 
 def test_light_below_the_surface_of_materialx(store: AssetStore) -> None:
-    """Radii are in the stage's units; what walks and what does not get one colour."""
+    """Radii and depths are in the stage's units."""
     skin = """        float inputs:subsurface = 0.5
         color3f inputs:subsurface_color = (0.8, 0.4, 0.2)
         color3f inputs:base_color = (0.4, 0.4, 0.4)
         color3f inputs:subsurface_radius = (1, 0.5, 0.25)
         float inputs:subsurface_scale = 0.2"""
     kind = "ND_standard_surface_surfaceshader"
-    found, scene = worn(store, material("Look", skin, kind=kind, output="mtlx:surface"))
-    assert found["subsurface"] == 0.5 and found["subsurface_radius"] == pytest.approx([0.2, 0.1, 0.05])
-    assert found["base_color"] == pytest.approx([0.6, 0.4, 0.3])
-    assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:subsurface_color"]
+    found, scene = worn(store, material("Look", skin, kind=kind, output="mtlx:surface"), unit=0.5)
+    assert (found["type"], found["subsurface_weight"], found["subsurface_radius"]) == ("openpbr", 0.5, 0.1)
+    assert "subsurface_radius_scale" not in found, "it is what openpbr has by itself"
+    assert found["subsurface_color"] == [0.8, 0.4, 0.2] and found["base_color"] == [0.4] * 3 and not scene.warnings
     wax = """        float inputs:subsurface_weight = 1
         color3f inputs:subsurface_color = (0.9, 0.8, 0.7)
+        float inputs:transmission_weight = 0.5
+        float inputs:transmission_depth = 4
         float inputs:subsurface_radius = 3"""
     kind = "ND_open_pbr_surface_surfaceshader"
-    found, scene = worn(store, material("Look", wax, kind=kind, output="mtlx:surface"))
-    assert found["subsurface_radius"] == pytest.approx([3, 1.5, 0.75])
-    assert found["base_color"] == pytest.approx([0.9, 0.8, 0.7]) and not scene.warnings
+    found, scene = worn(store, material("Look", wax, kind=kind, output="mtlx:surface"), unit=0.5)
+    assert (found["subsurface_radius"], found["transmission_depth"]) == (1.5, 2) and not scene.warnings
+    assert found["subsurface_color"] == [0.9, 0.8, 0.7]
+
+
+def test_what_fades_is_glass_and_what_is_not_there_is_alpha(store: AssetStore) -> None:
+    """UsdPreviewSurface's opacity: transparent, present in part, or cut off."""
+    found, scene = worn(
+        store, material("Look", "float inputs:opacity = 0.25\ncolor3f inputs:diffuseColor = (0, 0, 1)")
+    )
+    assert found["transmission"] == 0.75 and found["base_color"] == [0.75, 0.75, 1] and "alpha" not in found
+    assert not scene.warnings
+    found, _ = worn(store, material("Look", 'float inputs:opacity = 0.25\ntoken inputs:opacityMode = "presence"'))
+    assert found["alpha"] == 0.25 and "transmission" not in found
+
+
+def test_the_rest_of_standard_surface(store: AssetStore) -> None:
+    """Opacity is a colour, whose mean counts, or a mask; anisotropy is turned and is ten to one at most."""
+    kind = "ND_standard_surface_surfaceshader"
+    inputs = """        color3f inputs:opacity = (0.25, 0.5, 0.75)
+        float inputs:specular_anisotropy = 0.45
+        float inputs:specular_rotation = 0.25"""
+    found, _ = worn(store, material("Look", inputs, kind=kind, output="mtlx:surface"))
+    assert (found["alpha"], found["anisotropic"], found["anisotropic_rotation"]) == (0.5, pytest.approx(0.5), 90)
+    inputs = "color3f inputs:opacity.connect = </Look/M.outputs:out>\n"
+    inputs += "float inputs:specular_roughness.connect = </Look/G.outputs:out>"
+    grey = IMAGE.replace('"I"', '"G"').replace("color3", "float").partition('    def Shader "M"')[0]
+    found, scene = worn(store, material("Look", inputs, IMAGE + grey, kind, "mtlx:surface"), {"a.png": CHANNELS})
+    assert found["alpha"] == {"texture": "a 2", "factor": 0.5} and found["roughness"] == {"texture": "a"}
+    assert not scene.warnings
+
+
+def test_gltf_s_model_in_usd(store: AssetStore) -> None:
+    inputs = "float inputs:metallic = 0.5\nfloat inputs:clearcoat = 1\nfloat inputs:iridescence = 0.25"
+    kind = "ND_gltf_pbr_surfaceshader"
+    found, scene = worn(store, material("Look", inputs, kind=kind, output="mtlx:surface"))
+    assert (found["metallic"], found["roughness"], found["clearcoat"]) == (0.5, 1, 1)
+    assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:iridescence"]
 
 
 def test_images_of_materialx_and_losses_that_the_preview_does_not_have(store: AssetStore) -> None:

@@ -112,7 +112,7 @@ class _Reading:
             raise ParseError(f"it has more than {MOST_MATERIALS} materials", place)
         surface = Surface(shader, graphs, self.values)
         try:
-            model(surface)
+            model.read(surface)
         except Unsupported as problem:
             raise ParseError(str(problem), place) from None
         self._displace(material, surface, graphs)

@@ -8,9 +8,7 @@ walk             the prims that are shown, and where they stand
 meshes           a mesh -> triangles with normals, colours and texture coordinates
 solids           spheres, boxes, cylinders, cones, capsules and planes
 materials        materials -> the document's
-preview_surface  UsdPreviewSurface, as parameters of `principled`
-materialx        standard_surface and OpenPBR, likewise
-material_reader  the parameters of one surface
+material_reader  the inputs of one surface, as the models read them
 pictures         nodes that read images
 networks         inputs of shaders, and what they lead to
 textures         images and how they lie on a surface -> the document's textures

@@ -1,4 +1,4 @@
-"""The parameters of one surface: constants, and images by the nodes that read them."""
+"""The inputs of one surface: constants, and images by the nodes that read them."""
 
 from __future__ import annotations
 
@@ -8,67 +8,59 @@ from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.networks import MOST_STEPS, Node
 from service.formats.read.usd.pictures import materialx_picture, picture
 from service.formats.read.usd.textures import Role, Textures
+from service.formats.surface import Model
+from service.formats.surface.inputs import COLORS
+from service.formats.surface.plain import Default, Given, PlainInputs
 
+MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's modes of opacity
 # Nodes of MaterialX that hand on their input, or a channel of it.
 PASSED = ("normalmap", "convert_", "dot_", "constant_", "extract_", "separate", "swizzle_")
 
 
-class Reader:
-    """The parameters of one surface. `charts` and `is_colored` say what of its meshes it uses; `unit` is how many
-    metres one of the stage's units has."""
+class Reader(PlainInputs):
+    """The inputs of one surface. `charts` and `is_colored` say what of its meshes it uses."""
 
-    def __init__(self, surface: Node, textures: Textures, unit: float, notes: Warnings) -> None:
+    def __init__(self, surface: Node, model: Model, textures: Textures, unit: float, notes: Warnings) -> None:
+        super().__init__(model.defaults)
         self.surface, self.textures, self.unit, self.notes = surface, textures, unit, notes
         self.charts: list[str] = []
         self.is_colored = False
         self._unread = surface  # the node of MaterialX at which reading ended
+        model.read(self)
 
-    def color(self, name: str, default: tuple[float, ...], most: float = 1.0) -> Any:
-        """A colour within 0..`most`, or a reference to a texture."""
-        found = self.surface.input(name, default)
-        if isinstance(found, Node):
-            read = self._read(found, "color", default)
-            if isinstance(read, dict):
-                return read
-            found = read
-        if isinstance(found, int | float):
-            found = (float(found),) * 3
-        if not isinstance(found, tuple) or len(found) < 3:
-            return list(default)
-        return [min(max(value, 0.0), most) for value in found[:3]]
+    @property
+    def document(self) -> dict[str, Any]:
+        """The material's; all colours have three numbers."""
+        return {
+            name: [value] * 3 if name in COLORS and isinstance(value, float) else value
+            for name, value in self.material.items()
+        }
 
-    def scalar(self, name: str, default: float, most: float = 1.0) -> Any:
-        """A number within 0..`most`, or a reference to a texture."""
-        found = self.surface.input(name, default)
-        if isinstance(found, Node):
-            read = self._read(found, "scalar", (default,) * 4)
-            if isinstance(read, dict):
-                return read
-            found = read[0]
-        return min(max(float(found), 0.0), most) if isinstance(found, int | float) else default
+    def given(self, name: str, default: Default) -> Given | None:
+        found = self.surface.input(name)
+        if not isinstance(found, Node):
+            return MODES.get(found, 0.0) if isinstance(found, str) else found
+        if isinstance(default, tuple):
+            return self._read(found, "color", default)
+        read = self._read(found, "scalar", (default or 0.0,) * 4)
+        return read if isinstance(read, dict) else read[0]
 
-    def normal(self, name: str) -> dict[str, Any] | None:
+    def is_given(self, name: str) -> bool:
+        return self.surface.has(name)
+
+    def is_textured(self, name: str) -> bool:
+        found = self.surface.input(name)
+        return isinstance(found, Node) and not found.kind.startswith("ND_constant_")
+
+    def bump(self, name: str) -> dict[str, Any] | None:
         found = self.surface.input(name)
         if not isinstance(found, Node):
             return None
         read = self._read(found, "normal", ())
         return read if isinstance(read, dict) else None
 
-    def constants(self, name: str, default: tuple[float, ...], most: float) -> tuple[float, ...]:
-        """A colour that a texture cannot stand for."""
-        found = self.surface.input(name, default)
-        if isinstance(found, Node):
-            words = " ".join(f"{each:g}" for each in default)
-            self.notes.add(self.surface.at(name), f"a texture is not supported here; {words} is used instead")
-            found = default
-        return tuple(min(max(value, 0.0), most) for value in found)
-
-    def constant(self, name: str, default: float, most: float = 1.0, least: float = 0.0) -> float:
-        """A number that a texture cannot stand for."""
-        found = self.surface.input(name, default)
-        if isinstance(found, Node):
-            self.notes.add(self.surface.at(name), f"a texture is not supported here; {default:g} is used instead")
-        return min(max(self.surface.number(name, default), least), most)
+    def note(self, name: str, detail: str) -> None:
+        self.notes.add(self.surface.at(name), detail)
 
     def _materialx(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
         """What a node of MaterialX is; None where it computes what is not read."""

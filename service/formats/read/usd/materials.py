@@ -10,12 +10,12 @@ from pxr import Usd, UsdShade
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.material_reader import Reader
-from service.formats.read.usd.materialx import SURFACES, materialx_surface
 from service.formats.read.usd.networks import Node, surface_of
-from service.formats.read.usd.preview_surface import preview_surface
 from service.formats.read.usd.textures import Textures
+from service.formats.surface import MODELS
 
 PREVIEW = "UsdPreviewSurface"
+RICH = {f"ND_{name}_surfaceshader": MODELS[name] for name in ("standard_surface", "open_pbr_surface", "gltf_pbr")}
 GREY = 0.8  # albedo of a mesh without a material and without a colour
 
 
@@ -54,12 +54,11 @@ class Materials:
         """The material in the document; None, with a warning, where it has no surface that is read."""
         key = self.key(material)
         if key not in self._bound:
-            found = self._read(material)
-            if found is None:
+            read = self._read(material)
+            if read is None:
                 return None
-            document, read = found
             name = unique(material.GetPrim().GetName(), self.documents)
-            self.documents[name] = document
+            self.documents[name] = read.document
             self._bound[key] = Bound(name, tuple(read.charts), read.is_colored)
         return self._bound[key]
 
@@ -74,25 +73,25 @@ class Materials:
             self._colors[key] = Bound(name, (), is_colored)
         return self._colors[key]
 
-    def _read(self, material: UsdShade.Material) -> tuple[dict[str, Any], Reader] | None:
+    def _read(self, material: UsdShade.Material) -> Reader | None:
         """MaterialX first, which says more; the preview's surface where it loses less."""
         preview, rich = surface_of(material, "", self.time), surface_of(material, "mtlx", self.time)
-        if rich is None and preview is not None and preview.kind in SURFACES:
+        if rich is None and preview is not None and preview.kind in RICH:
             preview, rich = None, preview
         fallback = preview if preview is not None and preview.kind == PREVIEW else None
-        if rich is not None and rich.kind in SURFACES:
+        if rich is not None and rich.kind in RICH:
             lost = Warnings()
-            read = Reader(rich, self.textures, self.unit, lost if fallback else self.notes)
-            document = materialx_surface(read)
+            read = Reader(rich, RICH[rich.kind], self.textures, self.unit, lost if fallback else self.notes)
             if fallback is None or not lost.document():
-                return document, read
+                return read
             detail = "the MaterialX surface has what is not supported; its UsdPreviewSurface is shown instead"
             self.notes.add(rich.pointer, detail)
         if fallback is not None:
-            read = Reader(fallback, self.textures, self.unit, self.notes)
-            return preview_surface(read), read
+            return Reader(fallback, MODELS[PREVIEW], self.textures, self.unit, self.notes)
         other: Node | None = rich or preview
         what = f"its surface is {other.kind[:60] or 'code'}" if other else "it has no surface of these"
-        detail = f"the material is not supported ({what}); UsdPreviewSurface, standard_surface and OpenPBR are"
+        detail = (
+            f"the material is not supported ({what}); UsdPreviewSurface, standard_surface, OpenPBR and gltf_pbr are"
+        )
         self.notes.add(str(material.GetPath()), detail)
         return None

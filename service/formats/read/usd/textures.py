@@ -45,7 +45,7 @@ class Picture:
 
     @property
     def channel(self) -> str:
-        return self.output if self.output in CHANNELS else "r"
+        return self.output if self.output in tuple(CHANNELS) else "r"
 
 
 @dataclass
