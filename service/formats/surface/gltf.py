@@ -28,58 +28,63 @@ SHOWN_ABBE = 20.0  # the Abbe number of a dispersion of 1
 
 
 def gltf_pbr(s: Inputs) -> None:
-    s.put("base_color", "base_color", s.tree("base_color"))
-    s.put("metallic", "metallic", s.tree("metallic"), 0.0)
-    _roughness(s)
+    common(s)
     _specular(s)
+    color = s.tree("sheen_color")
+    if not s.is_black(color):
+        parts.sheen(s, constant(1.0), color, s.tree("sheen_roughness"), "sheen_color")
+    _stretch(s)
+    parts.coat(s, "clearcoat", "clearcoat_roughness", normal="clearcoat_normal")
     is_body = s.is_used("thickness", 0)
     s.put("transmission", "transmission", s.tree("transmission"), 0.0)
     if s.is_used("transmission", 0):
         _inside(s, is_body)
     _through(s, is_body)
-    color = s.tree("sheen_color")
-    if not s.is_black(color):
-        parts.sheen(s, constant(1.0), color, s.tree("sheen_roughness"), "sheen_color")
-    parts.coat(s, "clearcoat", "clearcoat_roughness", normal="clearcoat_normal")
     parts.film(s, "iridescence_thickness", "iridescence_ior", "iridescence")
-    finish(s)
-    s.lose([parts.OCCLUSION])
+    opacity(s)
     if s.is_given("tangent"):
         s.note("tangent", TANGENT)
 
 
-def finish(s: Inputs) -> None:
-    """What glTF's older model of specular and glossiness has as well: emission, opacity and normals."""
+def common(s: Inputs) -> None:
+    """What glTF's older model of specular and glossiness has as well."""
+    s.put("base_color", "base_color", s.tree("base_color"))
+    s.put("metallic", "metallic", s.tree("metallic"), 0.0)
+    s.put("roughness", "roughness", s.tree("roughness"))
     parts.emission(s, times(s.tree("emissive"), s.tree("emissive_strength")), "emissive")
-    mode = int(s.number("alpha_mode", OPAQUE))
-    if mode != OPAQUE:
-        s.put("alpha", "alpha", s.tree("alpha"), 1.0)
-    cutoff = s.constant("alpha_cutoff")
-    if mode == MASK and cutoff is not None and cutoff[0] > 1:
-        s.material["alpha"] = 0.0
-    elif mode == MASK:
-        s.put("alpha_cutoff", "alpha_cutoff", s.tree("alpha_cutoff"))
     s.normal("normal_map", "normal")
+    s.lose([parts.OCCLUSION])
 
 
-def _roughness(s: Inputs) -> None:
+def opacity(s: Inputs) -> None:
+    mode = int(s.number("alpha_mode", OPAQUE))
+    if mode == OPAQUE:
+        return
+    s.put("alpha", "alpha", s.tree("alpha"), 1.0)
+    if mode == MASK:
+        cutoff = s.constant("alpha_cutoff")
+        if cutoff is not None and cutoff[0] > 1:
+            s.material["alpha"] = 0.0
+        else:
+            s.put("alpha_cutoff", "alpha_cutoff", s.tree("alpha_cutoff"))
+
+
+def _stretch(s: Inputs) -> None:
     """Alpha along the tangent is mix(r^2, 1, strength^2), across it r^2; ours is stretched both ways."""
     roughness, strength = s.tree("roughness"), s.tree("anisotropy_strength")
-    if not s.is_used("anisotropy_strength", 0):
-        s.put("roughness", "roughness", roughness)
+    if s.is_black(strength):
         return
     turn = times(s.tree("anisotropy_rotation"), 180 / math.pi)
     s.put("anisotropic_rotation", "anisotropy_rotation", turn, 0.0)
     if s.computes or not any(s.fixed(each) is None for each in (roughness, strength)):
         alpha = clamped(raised(roughness, 2.0), 1e-4, 1.0)
-        along = mixed(alpha, constant(1.0), times(strength, strength))
+        along = clamped(mixed(raised(roughness, 2.0), constant(1.0), times(strength, strength)), 1e-4, 1.0)
         s.put("roughness", "roughness", raised(times(along, alpha), 0.25))
         parts.stretched(s, "anisotropy_strength", quotient(alpha, along))
         return
-    s.put("roughness", "roughness", roughness)
     s.note("anisotropy_strength", "under a texture, anisotropy stretches the highlight in both directions, not one")
-    most = s.most("anisotropy_strength")[0]  # whose square times the texture is near to the square of both
-    s.put("anisotropic", "anisotropy_strength", times(strength, float(most)))
+    most = float(s.most("anisotropy_strength")[0])  # whose square times the texture is near to the square of both
+    s.put("anisotropic", "anisotropy_strength", times(strength, most))
 
 
 def _specular(s: Inputs) -> None:
@@ -88,15 +93,13 @@ def _specular(s: Inputs) -> None:
     beyond = max(1.0, *map(float, s.most("specular_color")))
     if s.is_given("specular_color"):
         s.put("specular_color", "specular_color", times(color, 1 / beyond), 1.0)
-    strength = times(s.tree("specular"), beyond)
-    if beyond == 1 and not s.is_used("specular", 1):
-        if s.is_given("ior"):
-            s.put("ior", "ior", s.tree("ior"))
-        return
-    if s.is_used("specular", 1) and not s.is_black(strength) and not s.is_used("transmission", 0):
+    strength, is_weighted = times(s.tree("specular"), beyond), s.is_used("specular", 1)
+    if is_weighted and not s.is_black(strength) and not s.is_used("transmission", 0):
         detail = "the weight lowers the reflection seen head-on only; at grazing angles it stays as it is"
         s.note("specular", detail)
-    parts.dielectric(s, "ior", strength, "specular", "transmission")
+    default = None if s.is_given("ior") else 1.5
+    is_weighted = is_weighted or beyond > 1
+    parts.dielectric(s, "ior", strength if is_weighted else None, "specular", "transmission", default)
 
 
 def _inside(s: Inputs, is_body: bool) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -131,26 +131,21 @@ class Inputs(ABC):
             if self.is_used(name, neutral):
                 self.note(name, detail)
 
-    def put(self, parameter: str, name: str, tree: Tree, default: float | None = None) -> None:
-        """Set a parameter to a tree, whose place is that of the input `name`; not where that is its default."""
+    def put(
+        self, parameter: str, name: str, tree: Tree, default: float | None = None, instead: Tree | None = None
+    ) -> None:
+        """Set a parameter to a tree, whose place is that of the input `name`; not where that is its default.
+        `instead` serves where the format's reader cannot compute the tree."""
         try:
             value = self.value(tree, name, *RANGES.get(parameter, (0.0, 1.0)), is_color=parameter in COLORS)
         except Unsupported as problem:
-            self.note(name, f"{problem}; the parameter is left out")
+            how = "the parameter is left out" if instead is None else "the input itself is used instead"
+            self.note(name, f"{problem}; {how}")
+            if instead is not None:
+                self.put(parameter, name, instead, default)
             return
         if default is None or isinstance(value, dict | list) or abs(value - default) > 1e-6:
             self.material[parameter] = value
-
-    def put_number(self, parameter: str, found: float, default: float) -> None:
-        """Set a parameter that has no texture; not where it is its default."""
-        low, high = RANGES.get(parameter, (0.0, 1.0))
-        if found != default:
-            self.material[parameter] = min(max(found, low), high)
-
-    def put_color(self, parameter: str, found: Sequence[float], default: Sequence[float], most: float = 1.0) -> None:
-        """Set a colour that has no texture; not where it is its default."""
-        if tuple(found) != tuple(default):
-            self.material[parameter] = [min(max(each, 0.0), most) for each in found]
 
     def normal(self, parameter: str, name: str) -> None:
         try:

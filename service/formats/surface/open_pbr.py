@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.document.numbers import LARGEST
-from service.formats.surface.inputs import Inputs, Triple
+from service.formats.surface.inputs import RANGES, Inputs, Triple
 from service.formats.surface.plain import Default
 from service.formats.surface.trees import constant, times
 
@@ -36,10 +36,10 @@ def open_pbr_surface(s: Inputs) -> None:
     for name in SAME:
         s.put(name, name, s.tree(name), None if s.is_given(name) else first(name))
     if s.is_used("subsurface_weight", 0):
-        s.put_number("subsurface_radius", s.number("subsurface_radius", 1.0) * s.unit, 1.0)
-        s.put_color("subsurface_radius_scale", s.triple("subsurface_radius_scale", RADIUS_SCALE), RADIUS_SCALE)
+        number(s, "subsurface_radius", s.number("subsurface_radius", 1.0) * s.unit, 1.0)
+        color(s, "subsurface_radius_scale", s.triple("subsurface_radius_scale", RADIUS_SCALE), RADIUS_SCALE)
         name = "subsurface_scatter_anisotropy"
-        s.put_number(name, s.number(name, 0.0), 0.0)
+        number(s, name, s.number(name, 0.0), 0.0)
     if s.is_used("transmission_weight", 0):
         inside(s)
     if s.is_set("geometry_thin_walled"):
@@ -63,12 +63,25 @@ def first(name: str) -> float:
 # What standard_surface has as well, when it is read as `openpbr`.
 
 
+def number(s: Inputs, parameter: str, found: float, default: float) -> None:
+    """Set a parameter that has no texture; not where it is its default."""
+    low, high = RANGES[parameter]
+    if found != default:
+        s.material[parameter] = min(max(found, low), high)
+
+
+def color(s: Inputs, parameter: str, found: Triple, default: Triple) -> None:
+    """Set a colour that has no texture; not where it is its default."""
+    if found != default:
+        s.material[parameter] = [min(max(each, 0.0), 1.0) for each in found]
+
+
 def inside(s: Inputs) -> None:
     """What light meets between two refractions."""
-    s.put_number("transmission_depth", s.number("transmission_depth", 0.0) * s.unit, 0.0)
-    s.put_color("transmission_scatter", s.triple("transmission_scatter", BLACK), BLACK)
+    number(s, "transmission_depth", s.number("transmission_depth", 0.0) * s.unit, 0.0)
+    color(s, "transmission_scatter", s.triple("transmission_scatter", BLACK), BLACK)
     name = "transmission_scatter_anisotropy"
-    s.put_number(name, s.number(name, 0.0), 0.0)
+    number(s, name, s.number(name, 0.0), 0.0)
 
 
 def disperse(s: Inputs, scale: float, abbe: float) -> None:
@@ -83,7 +96,7 @@ def emission(s: Inputs, strength: str, nits: float) -> None:
     if found is None:
         s.put("emission_luminance", strength, constant(1 / NITS))
         light = times(s.tree("emission_color"), times(s.tree(strength), nits * NITS))
-        s.put("emission_color", "emission_color", light)
+        s.put("emission_color", "emission_color", light, instead=s.tree("emission_color"))
         return
     s.put("emission_luminance", strength, constant(found[0] * nits), 0.0)
     if s.is_given("emission_color"):

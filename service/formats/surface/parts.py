@@ -11,6 +11,7 @@ from service.formats.surface.trees import (
     clamped,
     complement,
     constant,
+    largest,
     less,
     quotient,
     raised,
@@ -36,15 +37,16 @@ def reflectance(ior: Tree) -> Tree:
     return raised(applied("absval", 1, **{"in": quotient(less(ior, constant(1.0)), added(ior, constant(1.0)))}), 2.0)
 
 
-def dielectric(s: Inputs, ior: str, strength: Tree | None, weight: str, transmission: str) -> None:
-    """The reflection under the name `ior`: what the inputs `weight` and others multiply it by, `strength`, goes into
-    the index, or with a texture into `specular`."""
-    if strength is None:
-        s.put("ior", ior, s.tree(ior), 1.5)
-        return
-    if s.is_used(transmission, 0):
-        s.put("ior", ior, s.tree(ior), 1.5)
+def dielectric(
+    s: Inputs, ior: str, strength: Tree | None, weight: str, transmission: str, default: float | None = 1.5
+) -> None:
+    """The reflection of an index of refraction: what the input `weight` and others multiply it by, `strength`, goes
+    into the index, or with a texture into `specular`."""
+    if strength is not None and s.is_used(transmission, 0):
         s.note(weight, "beside transmission the index alone sets the reflection")
+        strength = None
+    if strength is None:
+        s.put("ior", ior, s.tree(ior), default)
         return
     f0 = times(reflectance(s.tree(ior)), strength)
     if s.fixed(strength) is None:
@@ -53,9 +55,20 @@ def dielectric(s: Inputs, ior: str, strength: Tree | None, weight: str, transmis
         s.put("ior", ior, index(f0), 1.5)
 
 
+def tint(s: Inputs, name: str) -> Tree:
+    """Set the hue of a colour that multiplies all of the reflection; what it takes off the rest: its largest
+    channel."""
+    color = s.tree(name)
+    is_known = s.computes or s.fixed(color) is not None
+    share = largest(color) if is_known else constant(float(max(s.most(name))))
+    if not s.is_black(color):
+        s.put("specular_color", name, quotient(color, clamped(share, 1e-6, 1e6)), 1.0)
+    return share
+
+
 def stretched(s: Inputs, name: str, ratio: Tree) -> None:
     """Anisotropy, of `ratio`, alpha across the tangent over that along it."""
-    s.put("anisotropic", name, quotient(complement(ratio), constant(STRETCH)))
+    s.put("anisotropic", name, quotient(complement(ratio), constant(STRETCH)), instead=s.tree(name))
 
 
 def sheen(s: Inputs, weight: Tree, color: Tree, roughness: Tree, name: str) -> None:
@@ -63,7 +76,7 @@ def sheen(s: Inputs, weight: Tree, color: Tree, roughness: Tree, name: str) -> N
         return
     s.put("sheen", name, weight, 0.0)
     s.put("sheen_color", name, color)
-    s.put("sheen_roughness", name, roughness, 0.5)
+    s.put("sheen_roughness", name, roughness)
 
 
 def coat(s: Inputs, weight: str, roughness: str, ior: str | None = None, normal: str | None = None) -> None:
@@ -94,12 +107,13 @@ def film(s: Inputs, thickness: str, ior: str, weight: str | None = None) -> None
     if not s.is_black(tree):
         s.put("film_thickness", thickness, tree, 0.0)
     if "film_thickness" in s.material:
-        s.put("film_ior", ior, s.tree(ior), 1.4)
+        s.put("film_ior", ior, s.tree(ior))
 
 
-def emission(s: Inputs, light: Tree, name: str) -> None:
+def emission(s: Inputs, light: Tree, name: str, color: Tree | None = None) -> None:
+    """`color` is the part of the light that serves where a strength and a colour are textures both."""
     if not s.is_black(light):
-        s.put("emission", name, light)
+        s.put("emission", name, light, instead=color)
 
 
 def abbe(s: Inputs, number: float) -> None:

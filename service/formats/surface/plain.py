@@ -16,8 +16,6 @@ from service.formats.types import Doubles
 Default = float | tuple[float, float, float] | None  # None: a direction, which the surface gives
 Given = float | tuple[float, ...] | dict[str, Any]
 
-NEAREST = "what is computed of this texture is not supported; it is scaled to what that is where the texture is white"
-
 
 @dataclass(eq=False)
 class Texture(Tree):
@@ -27,8 +25,8 @@ class Texture(Tree):
 
 
 class PlainInputs(Inputs):
-    """`defaults` has each input of the model. A texture times a number stays a texture; of another formula there is
-    what it is where the texture is white."""
+    """`defaults` has each input of the model. A texture times a number stays a texture; other formulas of textures
+    are unsupported."""
 
     computes = False
 
@@ -68,9 +66,7 @@ class PlainInputs(Inputs):
         return None if _textures(tree) else value(tree, {})[0]
 
     def most(self, name: str) -> Any:
-        return self._white(self.tree(name))
-
-    def _white(self, tree: Tree) -> Any:
+        tree = self.tree(name)
         return value(tree, {id(one): np.ones((1, one.size)) for one in _textures(tree)})[0]
 
     def direction(self, name: str) -> tuple[float, float] | None:
@@ -84,31 +80,13 @@ class PlainInputs(Inputs):
         found = self.fixed(tree)
         if found is not None:
             return self._number(self._within(found, name, low, high), is_color)
-        first, *others = _textures(tree)
-        by = self._factors(tree, first, others)
-        if by is None or others:
-            self.note(name, NEAREST)
+        texture, *others = _textures(tree)
+        by = None if others else _factors(tree, texture)
         if by is None:
-            by = self._white(tree)
+            raise Unsupported("what is computed of its textures is not supported")
         if not np.abs(by).max():
             return self._number(by, is_color)
-        return first.reference | self.scale(self._number(self._within(by, name, 0.0, high), is_color))
-
-    def _factors(self, tree: Tree, texture: Texture, others: list[Texture]) -> Any:
-        """(size,) what the channels of a texture are multiplied by, where the others are white; None where it is
-        something else. A number of a colour's texture is read as that of a grey one."""
-        channels = texture.size if tree.size == texture.size else 1
-        white = {id(one): np.ones((1, one.size)) for one in others}
-
-        def values(texels: Doubles) -> Any:
-            return value(tree, white | {id(texture): np.repeat(texels, texture.size // channels, axis=1)})
-
-        found = factors(tree.size, channels, values)
-        if found is None:
-            return None
-        by, picked = found
-        is_whole = all(k % channels == picked[k] for k in range(tree.size) if by[k])
-        return by if is_whole else None
+        return texture.reference | self.scale(self._number(self._within(by, name, 0.0, high), is_color))
 
     def scale(self, factor: Any) -> dict[str, Any]:
         """The member of a reference that says its factor."""
@@ -131,3 +109,18 @@ class PlainInputs(Inputs):
 def _textures(tree: Tree) -> list[Texture]:
     """Those that a tree reads, each once."""
     return [one for one in walk(tree) if isinstance(one, Texture)]
+
+
+def _factors(tree: Tree, texture: Texture) -> Any:
+    """(size,) what the channels of the only texture of a tree are multiplied by; None where it is something else. A
+    number that follows from a colour's texture is read of it as of a grey one."""
+    channels = texture.size if tree.size == texture.size else 1
+
+    def values(texels: Doubles) -> Any:
+        return value(tree, {id(texture): np.repeat(texels, texture.size // channels, axis=1)})
+
+    found = factors(tree.size, channels, values)
+    if found is None:
+        return None
+    by, picked = found
+    return by if all(k % channels == picked[k] for k in range(tree.size) if by[k]) else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from service.formats.surface import parts
 from service.formats.surface.inputs import Inputs
 from service.formats.surface.plain import Default
-from service.formats.surface.trees import clamped, complement, constant, largest, mixed, quotient
+from service.formats.surface.trees import complement, constant, mixed
 
 BLACK = (0.0, 0.0, 0.0)
 DEFAULTS: dict[str, Default] = {
@@ -37,17 +37,17 @@ def usd_preview_surface(s: Inputs) -> None:
 def _reflecting(s: Inputs) -> None:
     """A reflectance head-on of its own: an index of refraction and a tint, or a metal where it is too high."""
     name = "specularColor"
-    color, found = s.tree(name), s.constant(name)
+    found = s.constant(name)
     if found is not None and max(found) >= DULL:
         if not s.is_black(s.tree("diffuseColor")):
             s.note(name, "a surface that reflects so much is shown as a metal, without diffuseColor")
-        s.put("base_color", name, color)
+        s.put("base_color", name, s.tree(name))
         s.material["metallic"] = 1.0
         return
-    strength = largest(color)
-    if not s.is_black(color):
-        s.put("specular_color", name, quotient(color, clamped(strength, 1e-6, 1.0)), 1.0)
-    s.put("ior", name, parts.index(strength))
+    if found is None and not s.computes:
+        s.note(name, "a texture is not supported here; a reflectance of 0.04 is used instead")
+        return
+    s.put("ior", name, parts.index(parts.tint(s, name)))
 
 
 def _opacity(s: Inputs) -> None:
@@ -58,7 +58,7 @@ def _opacity(s: Inputs) -> None:
         s.put("transmission", "opacity", complement(s.tree("opacity")), 0.0)
         if opacity[0] < 1:
             clear = mixed(constant(1.0, 1.0, 1.0), s.tree("diffuseColor"), s.tree("opacity"))
-            s.put("base_color", "diffuseColor", clear)
+            s.put("base_color", "diffuseColor", clear, instead=s.tree("diffuseColor"))
         return
     if is_glass:
         detail = "under a texture, a transparent surface is one that rays meet less often, without highlights"

@@ -13,7 +13,6 @@ from service.formats.surface.trees import (
     clamped,
     complement,
     constant,
-    largest,
     mean,
     mixed,
     quotient,
@@ -80,7 +79,7 @@ def _principled(s: Inputs) -> None:
     if s.is_used("coat", 0) and s.is_used("coat_color", 1):
         s.note("coat_color", "the colour of the coat tints what is under it, at all angles alike")
         base = times(base, mixed(constant(*WHITE), s.tree("coat_color"), s.tree("coat")))
-    s.put("base_color", "base_color", base)
+    s.put("base_color", "base_color", base, instead=s.tree("base_color"))
     s.put("metallic", "metalness", metalness, 0.0)
     s.put("roughness", "specular_roughness", s.tree("specular_roughness"))
     if s.is_used("specular_anisotropy", 0):
@@ -93,7 +92,7 @@ def _principled(s: Inputs) -> None:
     parts.film(s, "thin_film_thickness", "thin_film_IOR")
     if s.is_used("transmission_dispersion", 0):
         parts.abbe(s, s.number("transmission_dispersion", 0))
-    parts.emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission")
+    parts.emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission", s.tree("emission_color"))
     s.put("alpha", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("normal_map", "normal")
     s.lose([
@@ -126,11 +125,10 @@ def _specular(s: Inputs) -> None:
     """The colour multiplies all of the reflection: its hue is a tint, its largest channel a part of the weight."""
     if s.material.get("metallic") == 1:
         return  # there is no dielectric
-    color, weight = s.tree("specular_color"), s.tree("specular")
     is_tinted = s.is_given("specular_color") and s.is_used("specular_color", 1)
-    if is_tinted and not s.is_black(color):
-        s.put("specular_color", "specular_color", quotient(color, clamped(largest(color), 1e-6, 1e6)), 1.0)
-    strength = times(weight, largest(color)) if is_tinted else weight
+    strength = s.tree("specular")
+    if is_tinted:
+        strength = times(strength, parts.tint(s, "specular_color"))
     is_weighted = is_tinted or s.is_used("specular", 1)
     parts.dielectric(s, "specular_IOR", strength if is_weighted else None, "specular", "transmission")
 
@@ -185,9 +183,9 @@ def _below(s: Inputs) -> None:
     radius, scale = s.triple("subsurface_radius", WHITE), s.number("subsurface_scale", 1.0)
     most = max(radius)
     share: Triple = (radius[0] / most, radius[1] / most, radius[2] / most) if most > 0 else WHITE
-    s.put_number("subsurface_radius", most * scale * s.unit, 1.0)
-    s.put_color("subsurface_radius_scale", share, RADIUS_SCALE)
-    s.put_number("subsurface_scatter_anisotropy", s.number("subsurface_anisotropy", 0.0), 0.0)
+    open_pbr.number(s, "subsurface_radius", most * scale * s.unit, 1.0)
+    open_pbr.color(s, "subsurface_radius_scale", share, RADIUS_SCALE)
+    open_pbr.number(s, "subsurface_scatter_anisotropy", s.number("subsurface_anisotropy", 0.0), 0.0)
 
 
 def _coat(s: Inputs) -> None:
@@ -224,6 +222,6 @@ def _stretched(s: Inputs, roughness: str, anisotropy: str, rotation: str, tangen
         across = complement(_anisotropy(s, anisotropy))
         wider = quotient(added(constant(1.0), times(across, across)), times(across, 2.0))
         tree = times(tree, raised(wider, 0.25))
-        s.put(f"{roughness}_anisotropy", anisotropy, complement(across), 0.0)
+        s.put(f"{roughness}_anisotropy", anisotropy, complement(across), 0.0, s.tree(anisotropy))
         s.tangent(tangent, "tangent", s.number(rotation, 0.0) * 360)
-    s.put(roughness, roughness, tree, open_pbr.first(roughness))
+    s.put(roughness, roughness, tree, open_pbr.first(roughness), s.tree(roughness))

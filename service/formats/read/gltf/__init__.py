@@ -17,13 +17,13 @@ deform                morph targets and skins, in the pose of the nodes
 animations            the pose of the nodes at one time of an animation
 variants              KHR_materials_variants
 materials             materials -> the document's
+material_inputs       the inputs of one material, as its model reads them
 material_reader       the numbers and textures of one material
-material_extensions   KHR_materials_*, as parameters of `principled`
 specular_glossiness   KHR_materials_pbrSpecularGlossiness
 textures              textures and samplers -> the document's
 ktx2_images           images of KHR_texture_basisu as PNG files
 texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
-iridescence           KHR_materials_iridescence as a thin film
+iridescence           weights and thicknesses of KHR_materials_iridescence
 lights_and_camera     lights and cameras -> the document's
 """

@@ -1,61 +1,32 @@
-"""KHR_materials_iridescence as the thin film of `principled`, which covers all of a surface or none of it."""
+"""The weight and the thickness of KHR_materials_iridescence, computed texel by texel where textures say them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from service.formats.read.gltf.json_view import JsonView
+from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.texture_bake import pixels, png
 from service.formats.read.gltf.textures import Textures
+from service.formats.surface.parts import HALF
 
-if TYPE_CHECKING:
-    from service.formats.read.gltf.material_reader import MaterialReader
-
-NAME = "KHR_materials_iridescence"
-DEFAULT_IOR, LEAST, MOST = 1.3, 100.0, 400.0  # of the extension; thicknesses in nm
-LARGEST_IOR, THICKEST = 4.0, 1e4  # of ours
-HALF = 0.5  # a film of this factor and above is nearer to a whole one than to none
+MOST, LEAST, THICKEST = 400.0, 100.0, 1e4  # nm: the extension's defaults, and the thickest film of a document
 LARGEST = 4096  # texels a side of a computed image
-OTHER_HUES = (
-    "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "
-    "most of all on metals"
-)
 
 
-def add(read: MaterialReader, document: dict[str, Any]) -> None:
-    place = read.place.extension(NAME)
-    weight = place.number("iridescenceFactor", 0, 0, 1) if place else 0.0
-    if place is None or weight == 0:
-        return
-    if weight < HALF:
-        detail = f"a film that covers a part of the surface is not supported; of {weight:g} it is left out"
-        read.notes.add(place.at("iridescenceFactor"), detail)
-        return
-    mask = read.texture(place, "iridescenceTexture", "linear")
-    if mask is None and weight < 1:
-        detail = f"a film that covers a part of the surface is not supported; of {weight:g} it covers all"
-        read.notes.add(place.at("iridescenceFactor"), detail)
-    thickness = _thickness(read, place, weight, mask)
-    if not isinstance(thickness, dict) and thickness == 0:
-        return
-    document["film_thickness"], document["film_ior"] = thickness, _ior(read, place)
-    read.notes.add(place.pointer, OTHER_HUES)
+def weight(read: MaterialReader, place: JsonView) -> float:
+    """1 where a texture says which texels the film covers: their thickness is made 0 elsewhere."""
+    found = place.number("iridescenceFactor", 0, 0, 1)
+    is_masked = found >= HALF and read.texture(place, "iridescenceTexture") is not None
+    return 1.0 if is_masked else found
 
 
-def _ior(read: MaterialReader, place: JsonView) -> float:
-    ior = place.number("iridescenceIor", DEFAULT_IOR, 0)
-    nearest = min(max(ior, 1.0), LARGEST_IOR)
-    if nearest != ior:
-        detail = f"a film's ior of {ior:g} is not supported; {nearest:g} is used instead"
-        read.notes.add(place.at("iridescenceIor"), detail)
-    return nearest
-
-
-def _thickness(read: MaterialReader, place: JsonView, weight: float, mask: str | None) -> Any:
+def thickness(read: MaterialReader, place: JsonView) -> Any:
     """In nm: a number, or a texture."""
-    texture = read.texture(place, "iridescenceThicknessTexture", "linear")
+    share, mask = place.number("iridescenceFactor", 0, 0, 1), read.texture(place, "iridescenceTexture")
+    texture = read.texture(place, "iridescenceThicknessTexture")
     most = _nanometres(read, place, "iridescenceThicknessMaximum", MOST)
     if texture is None and mask is None:
         return most
@@ -67,7 +38,7 @@ def _thickness(read: MaterialReader, place: JsonView, weight: float, mask: str |
     if mask is not None:
         detail = "a film covers all of a texel or nothing here: all where the factor times the texture is 0.5 or more"
         read.notes.add(place.at("iridescenceTexture"), detail)
-    return _baked(read, place, (weight, least, most), (mask, texture))
+    return _baked(read, place, (share, least, most), (mask, texture))
 
 
 def _nanometres(read: MaterialReader, place: JsonView, name: str, default: float) -> float:

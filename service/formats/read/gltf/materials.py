@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.formats.read.gltf import material_extensions
+from service.document.numbers import BRIGHTEST
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.json_view import JsonView
+from service.formats.read.gltf.material_inputs import GLOSSY, MaterialInputs
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.specular_glossiness import converted
 from service.formats.read.gltf.textures import Chart, Textures
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.surface import gltf
 
-WHITE = (1.0, 1.0, 1.0)
+OTHER_HUES = (
+    "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "
+    "most of all on metals"
+)
 
 
 class Materials:
@@ -46,74 +51,35 @@ class Materials:
         return self._names[key], place
 
     def _document(self, read: MaterialReader) -> dict[str, Any]:
-        place = read.place
-        if "occlusionTexture" in place:
-            self.notes.add(place.at("occlusionTexture"), "the occlusion texture is not used; occlusion is traced")
-        glossy = place.extension("KHR_materials_pbrSpecularGlossiness")
-        if place.extension("KHR_materials_unlit") is not None:
-            document = self._unlit(read)
+        glossy = read.owner(GLOSSY)
+        if read.owner("unlit") is not None:
+            inputs = MaterialInputs(read)
+            _unlit(inputs)
+            gltf.opacity(inputs)
         elif glossy is not None:
-            document = converted(read, glossy) | self._emission(read) | self._normal(read)
+            inputs = MaterialInputs(read, GLOSSY, converted(read, glossy))
+            gltf.common(inputs)
+            gltf.opacity(inputs)
         else:
-            document = self._rough(read)
-        self._alpha(read, document, glossy)
-        return document
+            inputs = MaterialInputs(read)
+            gltf.gltf_pbr(inputs)
+            self._tell(read, inputs.material)
+        if "emission" in inputs.material and read.place.flag("doubleSided"):
+            inputs.material["emission_sides"] = "both"
+        return inputs.material
 
-    def _rough(self, read: MaterialReader) -> dict[str, Any]:
-        place = read.place
-        rough = place.object("pbrMetallicRoughness") or JsonView({}, place.at("pbrMetallicRoughness"))
-        base = read.share(rough, "baseColorFactor", (1.0,) * 4)
-        metallic, roughness = rough.number("metallicFactor", 1, 0, 1), rough.number("roughnessFactor", 1, 0, 1)
-        document: dict[str, Any] = {
-            "type": "principled",
-            "base_color": read.color(rough, "baseColorTexture", base[:3]),
-            "metallic": read.scalar(rough, "metallicRoughnessTexture", metallic, "b"),
-            "roughness": read.scalar(rough, "metallicRoughnessTexture", roughness, "g"),
-        }
-        document |= self._emission(read) | self._normal(read)
-        material_extensions.add(read, document)
-        return document
+    def _tell(self, read: MaterialReader, material: dict[str, Any]) -> None:
+        """Warn of what the inputs do not say."""
+        film, volume = read.owner("iridescence"), read.owner("volume")
+        if film is not None and "film_thickness" in material:
+            self.notes.add(film.pointer, OTHER_HUES)
+        is_body = "transmission" in material and "thin_walled" not in material
+        if volume is not None and "thicknessTexture" in volume and is_body:
+            detail = "the thickness texture is not used; rays go through the geometry itself"
+            self.notes.add(volume.at("thicknessTexture"), detail)
 
-    def _unlit(self, read: MaterialReader) -> dict[str, Any]:
-        """An unlit material: its colour is radiance, and it reflects nothing."""
-        rough = read.place.object("pbrMetallicRoughness") or JsonView({}, read.place.at("pbrMetallicRoughness"))
-        base = rough.color("baseColorFactor", (1.0,) * 4)
-        document = {"type": "diffuse", "albedo": 0.0, "emission": read.color(rough, "baseColorTexture", base[:3])}
-        if read.place.flag("doubleSided"):
-            document["emission_sides"] = "both"
-        return document
 
-    def _emission(self, read: MaterialReader) -> dict[str, Any]:
-        place = read.place
-        strength = place.extension("KHR_materials_emissive_strength")
-        scale = strength.number("emissiveStrength", 1, 0) if strength else 1.0
-        emission: tuple[float, ...] = tuple(place.radiance("emissiveFactor", (0.0, 0.0, 0.0), scale))
-        if not max(emission):
-            return {}
-        sides = {"emission_sides": "both"} if place.flag("doubleSided") else {}
-        return {"emission": read.color(place, "emissiveTexture", emission), **sides}
-
-    def _normal(self, read: MaterialReader) -> dict[str, Any]:
-        return material_extensions.normal_map(read, read.place, "normalTexture", "normal_map")
-
-    def _alpha(self, read: MaterialReader, document: dict[str, Any], glossy: JsonView | None) -> None:
-        place = read.place
-        mode = place.text("alphaMode", "OPAQUE")
-        if mode not in ("OPAQUE", "MASK", "BLEND"):
-            raise place.error("alphaMode", f"must be OPAQUE, MASK or BLEND, not {mode[:40]!r}")
-        if mode == "OPAQUE":
-            return
-        owner, color, texture = glossy, "diffuseFactor", "diffuseTexture"
-        if owner is None:
-            owner, color, texture = place.object("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
-        if owner is not None:
-            alpha = read.share(owner, color, (1.0,) * 4)[3]
-            value = read.scalar(owner, texture, alpha, "a", "srgb")
-            if value != 1:
-                document["alpha"] = value
-        if mode == "MASK":
-            cutoff = place.number("alphaCutoff", 0.5, 0)
-            if cutoff > 1:
-                document["alpha"] = 0.0
-            else:
-                document["alpha_cutoff"] = cutoff
+def _unlit(inputs: MaterialInputs) -> None:
+    """An unlit material: its colour is radiance, and it reflects nothing."""
+    color = inputs.value(inputs.tree("base_color"), "base_color", 0.0, BRIGHTEST, is_color=True)
+    inputs.material = {"type": "diffuse", "albedo": 0.0, "emission": color}

@@ -6,18 +6,15 @@ where a dielectric reflects 4 % head-on.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from service.colorimetry import decode_srgb, encode_srgb
 from service.formats.read.gltf.json_view import JsonView
+from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.texture_bake import pixels, png
-from service.formats.read.gltf.textures import factor
 from service.formats.types import Floats
-
-if TYPE_CHECKING:
-    from service.formats.read.gltf.material_reader import MaterialReader
 
 F0 = 0.04
 LARGEST = 4096  # texels a side of a computed image
@@ -25,16 +22,16 @@ CHUNK = 1 << 18  # texels at once: float copies of a whole image take gigabytes
 
 
 def converted(read: MaterialReader, place: JsonView) -> dict[str, Any]:
+    """Colour, metallic and roughness."""
     diffuse = read.share(place, "diffuseFactor", (1.0,) * 4)
     specular = read.share(place, "specularFactor", (1.0, 1.0, 1.0))
     glossiness = place.number("glossinessFactor", 1, 0, 1)
     textured = _textured(read, place, (diffuse[:3], specular, glossiness))
     if textured:
-        return {"type": "principled", **textured}
+        return textured
     base, metal = metallic_roughness(np.array([diffuse[:3]], np.float32), np.array([specular], np.float32))
     return {
-        "type": "principled",
-        "base_color": factor(tuple(base[0].tolist())),
+        "base_color": tuple(base[0].tolist()),
         "metallic": float(metal[0]),
         "roughness": 1 - glossiness,
     }
