@@ -25,8 +25,6 @@ class Asked:
 class MaterialWriter:
     """The base colour with alpha, and what is told of all other fields."""
 
-    narrowed: float | None = None  # the roughness across a stretched highlight, where glTF's takes its place
-
     def __init__(self, material: Any, name: str, textures: Textures, asked: Asked) -> None:
         """`material` is the document's of this name, or `principled` in its place."""
         self.material, self.asked, self.textures = material, asked, textures
@@ -85,14 +83,14 @@ class MaterialWriter:
             return factor, (None, None, None)
         return factor, tuple(self.textures.plane(value, k, self.at(field)) for k in range(3))
 
-    def scalar(self, value: Any, field: str, channel: int) -> tuple[float, Plane | None]:
-        """The factor within 0..1, and the plane of its texture."""
+    def scalar(self, value: Any, field: str, channel: int, most: float = 1.0) -> tuple[float, Plane | None]:
+        """The factor within 0..`most`, and the plane of its texture."""
         if not isinstance(value, ScalarTexture):
             return value, None
         factor = value.factor
-        if factor > 1:
-            self.tell(field, "the texture's factor ends at 1 in glTF")
-            factor = 1.0
+        if factor > most:
+            self.tell(field, f"the texture's factor ends at {most:g} in glTF")
+            factor = most
         return factor, None if factor == 0 else self.textures.plane(value, channel, self.at(field))
 
     def normal(self, value: NormalTexture | None, field: str) -> Tree | None:

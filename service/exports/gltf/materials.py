@@ -16,9 +16,12 @@ from service.exports.gltf.material_writer import Asked, MaterialWriter
 from service.exports.gltf.textures import Plane, Textures
 from service.exports.losses import Losses
 from service.exports.principled import as_principled
+from service.formats.surface import gltf
+from service.formats.surface.outputs import Output
 from service.problems import escaped
 
 BLACK = (0.0, 0.0, 0.0)
+FILM_WEIGHT = "thin_film_weight"  # of models whose films cover a part, which glTF has as well
 
 
 @dataclass
@@ -58,7 +61,7 @@ class Materials:
     def _as_principled(self, name: str) -> PrincipledMaterial:
         if name not in self._plain:
             material, pointer = self.scene.materials[name], f"/materials/{escaped(name)}"
-            self._plain[name] = as_principled(material, pointer, self.losses, kept={extensions.FILM_WEIGHT})
+            self._plain[name] = as_principled(material, pointer, self.losses, kept={FILM_WEIGHT})
         return self._plain[name]
 
     def _unlit(self, material: DiffuseMaterial, name: str, asked: Asked) -> Tree:
@@ -94,12 +97,13 @@ def _transmits(material: AnySurface) -> bool:
 
 class _Principled(MaterialWriter):
     def written(self) -> Tree:
-        m = self.material
-        made = self.base(m.base_color, "base_color")
-        found = extensions.written(self) | self._emission(made)
-        rough, metallic = self.scalar(m.roughness, "roughness", 1), self.scalar(m.metallic, "metallic", 2)
-        if self.narrowed is not None:
-            rough = self.narrowed, None
+        weight = getattr(self.given, FILM_WEIGHT, 1.0)
+        inputs = gltf.written(self.material, self.tell, self.asked.thickness, Output(weight, FILM_WEIGHT))
+        made = self.base(inputs["base_color"].value, "base_color")
+        found = extensions.written(self, inputs) | self._emission(made)
+        rough, metallic = (
+            self.scalar(*inputs[name], channel) for name, channel in (("roughness", 1), ("metallic", 2))
+        )
         pbr = made["pbrMetallicRoughness"]
         for name, (factor, _) in (("metallicFactor", metallic), ("roughnessFactor", rough)):
             if factor != 1:
@@ -107,12 +111,11 @@ class _Principled(MaterialWriter):
         g, b = (self._beside(mine, other) for mine, other in ((rough, metallic), (metallic, rough)))
         if (info := self.textures.info((None, g, b, None), is_srgb=False)) is not None:
             pbr["metallicRoughnessTexture"] = info
-        if (normal := self.normal(m.normal_map, "normal_map")) is not None:
+        if (normal := self.normal(self.material.normal_map, "normal_map")) is not None:
             made["normalTexture"] = normal
         if found:
             made["extensions"] = found
-        self.tell_others(extensions.WRITTEN | {"base_color", "roughness", "metallic", "normal_map", "emission",
-                                               "emission_sides"})  # fmt: skip
+        self.tell_others(gltf.WRITTEN | {"emission_sides"})
         return made
 
     def _beside(self, mine: tuple[float, Plane | None], other: tuple[float, Plane | None]) -> Plane | None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from service.document import Scene
 from service.document.material import OpenpbrMaterial
+from service.document.texture import ColorTexture, NormalTexture
 from service.exports.losses import Losses
-from service.exports.materialx.graph import Graph, Images, valid
-from service.exports.materialx.models import open_pbr_surface, standard_surface
+from service.exports.materialx.graph import Graph, Images, Value, switch, valid
 from service.exports.principled import as_principled
 from service.exports.writing import Exported, Files, Limits, check_size
+from service.formats.surface import MODELS, open_pbr, standard
+from service.formats.surface.outputs import Output, is_used
+from service.formats.surface.plain import Default
 from service.problems import escaped
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39" colorspace="lin_rec709">\n'
@@ -42,14 +47,35 @@ def _written(scene: Scene, name: str, own: str, images: Images, losses: Losses) 
     pointer = f"/materials/{escaped(name)}"
     material, graph = scene.materials[name], Graph(images, pointer, losses)
     if isinstance(material, OpenpbrMaterial):
-        model, inputs = "open_pbr_surface", open_pbr_surface(material, graph)
+        model, inputs = "open_pbr_surface", open_pbr.written(material)
     else:
-        model, inputs = "standard_surface", standard_surface(as_principled(material, pointer, losses), graph)
+        material = as_principled(material, pointer, losses)
+        model, inputs = "standard_surface", standard.written(material, graph.tell)
+    if is_used(material.emission) and material.emission_sides == "both":
+        graph.tell("emission_sides", "the file does not say on which sides a surface shines")
+    if material.height is not None:
+        graph.tell("height", "heights are not written")
     if own != name:
         losses.add(pointer, f"names in MaterialX have letters, digits and _ only; it is called {own}")
-    lines = [graph.input(each, value, f"NG_{own}") for each, value in inputs.items()]
+    values = {each: _value(graph, MODELS[model].defaults[each], output) for each, output in inputs.items()}
+    lines = [graph.input(each, value, f"NG_{own}") for each, value in values.items() if value is not None]
     shader = [f'  <{model} name="SR_{own}" type="surfaceshader">', *lines, f"  </{model}>"]
     wired = f'<input name="surfaceshader" type="surfaceshader" nodename="SR_{own}" />'
     shader.append(f'  <surfacematerial name="{own}" type="material">{wired}</surfacematerial>')
     text = graph.text(f"NG_{own}")
     return "\n".join([*([text] if text else []), *shader])
+
+
+def _value(graph: Graph, default: Default, output: Output) -> Value | None:
+    """The value of an input in the file; None for a normal map without a node."""
+    value, parameter = output
+    if isinstance(value, bool):
+        return switch(value)
+    if isinstance(value, NormalTexture):
+        return graph.normal(value, parameter)
+    if default is None:
+        return graph.tangent(math.degrees(math.atan2(value[1], value[0])))
+    if isinstance(value, tuple | ColorTexture):
+        return graph.color(value, parameter)
+    found = graph.number(value, parameter)
+    return graph.converted(found, "color3") if isinstance(default, tuple) else found

@@ -1,16 +1,19 @@
 """One vocabulary of materials: what the inputs of the surface models that files have mean. The names are MaterialX'.
 
-A reader of a format gives `Inputs`, its syntax; a model's file says once what they are as a material of the document.
+A reader of a format gives `Inputs`, its syntax, and a writer takes `Outputs`; a model's file says once for each
+direction what they are as a material of the document.
 
-standard  Autodesk Standard Surface
-open_pbr  OpenPBR Surface
-gltf      glTF's metallic-roughness model with its extensions
-preview   UsdPreviewSurface
-disney    the Disney model
-parts     what several of them have in common
-inputs    what a model reads a shader by, and the parameters that it sets
-plain     inputs that are numbers, colours and textures
-trees     formulas that hold for numbers and for textures
+standard      Autodesk Standard Surface
+open_pbr      OpenPBR Surface
+gltf          glTF's metallic-roughness model with its extensions
+preview       UsdPreviewSurface
+disney        the Disney model
+parts         what several of them have in common
+gltf_members  where a glTF file says the inputs of its model
+inputs        what a model reads a shader by, and the parameters that it sets
+plain         inputs that are numbers, colours and textures
+outputs       what a model's writer gives
+trees         formulas that hold for numbers and for textures
 """
 
 from collections.abc import Callable, Mapping

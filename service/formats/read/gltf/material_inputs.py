@@ -4,68 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from service.document.numbers import LARGEST
 from service.formats.read.gltf import anisotropy_texture, iridescence
 from service.formats.read.gltf.json_view import JsonView
-from service.formats.read.gltf.material_reader import ROUGH, MaterialReader
+from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.surface.gltf import BLEND, DEFAULTS, MASK, OPAQUE
-from service.formats.surface.inputs import LEAST_LENGTH
+from service.formats.surface.gltf_members import GLOSSY, ROUGH, ROWS, Row
 from service.formats.surface.plain import Default, Given, PlainInputs
 
 MODES = {"OPAQUE": OPAQUE, "MASK": MASK, "BLEND": BLEND}
-GLOSSY = "pbrSpecularGlossiness"
 BASE = {ROUGH: ("baseColorFactor", "baseColorTexture"), GLOSSY: ("diffuseFactor", "diffuseTexture")}
-
-
-@dataclass(frozen=True)
-class Row:
-    """Where a file says an input: the extension, the factor with its range, and the texture with its channel; of a
-    colour there are all three."""
-
-    extension: str  # "" for the material itself
-    factor: str
-    texture: str = ""
-    channel: str = ""
-    low: float = 0.0
-    high: float = 1.0
-
-
-def _row(extension: str, name: str, channel: str = "") -> Row:
-    return Row(extension, f"{name}Factor", f"{name}Texture", channel)
-
-
-ROWS = {
-    "metallic": Row(ROUGH, "metallicFactor", "metallicRoughnessTexture", "b"),
-    "roughness": Row(ROUGH, "roughnessFactor", "metallicRoughnessTexture", "g"),
-    "normal": Row("", "normalTexture"),
-    "occlusion": Row("", "", "occlusionTexture"),
-    "emissive": Row("", "emissiveFactor", "emissiveTexture"),
-    "alpha_mode": Row("", "alphaMode"),
-    "alpha_cutoff": Row("", "alphaCutoff", high=math.inf),
-    "ior": Row("ior", "ior", high=math.inf),
-    "specular": _row("specular", "specular", "a"),
-    "specular_color": _row("specular", "specularColor"),
-    "sheen_color": _row("sheen", "sheenColor"),
-    "sheen_roughness": _row("sheen", "sheenRoughness", "a"),
-    "anisotropy_strength": Row("anisotropy", "anisotropyStrength", "anisotropyTexture", "b"),
-    "anisotropy_rotation": Row("anisotropy", "anisotropyRotation"),
-    "clearcoat": _row("clearcoat", "clearcoat", "r"),
-    "clearcoat_roughness": _row("clearcoat", "clearcoatRoughness", "g"),
-    "clearcoat_normal": Row("clearcoat", "clearcoatNormalTexture"),
-    "transmission": _row("transmission", "transmission", "r"),
-    "thickness": Row("volume", "thicknessFactor", high=math.inf),
-    "attenuation_distance": Row("volume", "attenuationDistance", low=LEAST_LENGTH, high=LARGEST),
-    "attenuation_color": Row("volume", "attenuationColor"),
-    "dispersion": Row("dispersion", "dispersion", high=math.inf),
-    "diffuse_transmission": _row("diffuse_transmission", "diffuseTransmission", "a"),
-    "diffuse_transmission_color": _row("diffuse_transmission", "diffuseTransmissionColor"),
-    "iridescence": Row("iridescence", "iridescenceFactor"),
-    "iridescence_ior": Row("iridescence", "iridescenceIor", high=math.inf),
-    "iridescence_thickness": Row("iridescence", "iridescenceThicknessMaximum"),
-}
 
 
 class MaterialInputs(PlainInputs):
@@ -99,7 +49,7 @@ class MaterialInputs(PlainInputs):
 
     def is_textured(self, name: str) -> bool:
         row, owner = self._found(name)
-        if owner is None or row.texture not in owner:
+        if owner is None or row.texture not in owner or name == "iridescence":  # whose mask is in the thickness
             return False
         found = _factor(owner, row, self.defaults[name])
         return max(found) > 0 if isinstance(found, tuple) else found > 0

@@ -5,9 +5,8 @@ from __future__ import annotations
 from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.textures import Chart, ColorSpace, Textures
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.surface.gltf_members import ROUGH
 from service.formats.surface.plain import Given
-
-ROUGH = "pbrMetallicRoughness"
 
 
 class MaterialReader:

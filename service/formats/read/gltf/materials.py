@@ -7,13 +7,14 @@ from typing import Any
 from service.document.numbers import BRIGHTEST
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.json_view import JsonView
-from service.formats.read.gltf.material_inputs import GLOSSY, MaterialInputs
+from service.formats.read.gltf.material_inputs import MaterialInputs
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.specular_glossiness import converted
 from service.formats.read.gltf.textures import Chart, Textures
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.surface import gltf
+from service.formats.surface.gltf_members import GLOSSY
 
 OTHER_HUES = (
     "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "
