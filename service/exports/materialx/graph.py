@@ -39,10 +39,6 @@ class Value:
     def is_textured(self) -> bool:
         return bool(self.node)
 
-    def scaled(self, factor: float) -> Value:
-        """Numbers times a factor."""
-        return Value(self.type, tuple(each * factor for each in self.numbers))
-
 
 def number(value: float) -> Value:
     return Value("float", (value,))

@@ -8,6 +8,7 @@ open_pbr      OpenPBR Surface
 gltf          glTF's metallic-roughness model with its extensions
 preview       UsdPreviewSurface
 disney        the Disney model
+wavefront     the statements of .mtl libraries
 parts         what several of them have in common
 gltf_members  where a glTF file says the inputs of its model
 inputs        what a model reads a shader by, and the parameters that it sets
