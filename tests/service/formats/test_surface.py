@@ -263,3 +263,48 @@ def same(found: dict[str, Any], wanted: dict[str, Any]) -> None:
     assert found.keys() == wanted.keys()
     for name, each in wanted.items():
         assert found[name] == (each if isinstance(each, str) else pytest.approx(each, rel=1e-5)), name
+
+
+def test_what_a_reader_cannot_compute_is_told_and_the_input_serves() -> None:
+    """Textures are multiplied by numbers; a mix of two, or a power of one, is computed for .mtlx files alone."""
+    said = {"base_color": COLOR, "base": GREY, "transmission": GREY, "specular_anisotropy": GREY}
+    read = Said("standard_surface", said)
+    assert read.material["base_color"] == COLOR and "itself is used" in read.notes["base_color"]
+    assert read.material["anisotropic"]["factor"] == pytest.approx(0.5 / 0.9), "below 0.98 it is a product"
+    whole = {**GREY, "factor": 1.0}
+    read = Said("standard_surface", {"specular_anisotropy": whole})
+    assert read.material["anisotropic"] == {"texture": "t", "channel": "g"} and "specular_anisotropy" in read.notes
+    read = Said("standard_surface", {"base_color": COLOR, "base": 0.5, "opacity": COLOR, "specular_color": COLOR})
+    assert read.material["base_color"]["factor"] == [0.25, 0.125, 0.0625]
+    assert read.material["alpha"]["factor"] == pytest.approx(0.875 / 3), "a mask's channels are equal"
+    assert read.material["specular_color"]["factor"] == [1.0, 0.5, 0.25] and not read.notes
+
+
+def test_a_weight_by_a_texture_is_specular() -> None:
+    read = Said("standard_surface", {"specular": GREY, "specular_IOR": 1.5})
+    assert read.material["specular"] == {**GREY, "factor": pytest.approx(0.5 * 0.04 / 0.08)}
+    assert "ior" not in read.material and not read.notes
+
+
+def test_gltf_s_own_rules() -> None:
+    """A cutoff above 1 hides all; dispersion is a body's; a reflection's colour within 0..1 is a tint, beyond it an
+    index."""
+    assert Said("gltf_pbr", {"alpha_mode": gltf.MASK, "alpha_cutoff": 1.5}).material["alpha"] == 0
+    glass = {"transmission": 1.0, "dispersion": 0.5}
+    assert "abbe" not in Said("gltf_pbr", glass).material
+    assert Said("gltf_pbr", {**glass, "thickness": 1.0}).material["abbe"] == 40
+    read = Said("gltf_pbr", {"metallic": 0.0, "specular_color": [0.5, 0.25, 0.25]})
+    assert read.material["specular_color"] == [0.5, 0.25, 0.25] and "ior" not in read.material
+    bright = Said("gltf_pbr", {"metallic": 0.0, "specular_color": [4.0, 2.0, 1.0]}).material
+    assert bright["specular_color"] == [1, 0.5, 0.25] and bright["ior"] == pytest.approx(1.4 / 0.6)
+
+
+def test_a_preview_that_reflects_much_is_a_metal() -> None:
+    read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": [0.9, 0.8, 0.7]})
+    assert read.material["metallic"] == 1 and read.material["base_color"] == [0.9, 0.8, 0.7]
+    assert "without diffuseColor" in read.notes["specularColor"]
+    read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": [0.09, 0.045, 0.0]})
+    assert read.material["ior"] == pytest.approx(1.3 / 0.7) and read.material["specular_color"] == [1, 0.5, 0]
+    assert "metallic" not in read.material and not read.notes
+    read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": COLOR})
+    assert "ior" not in read.material and "0.04" in read.notes["specularColor"]
