@@ -49,7 +49,7 @@ class EnvironmentArrays:
         return self.texels.nbytes + self.probability.nbytes + self.cells.nbytes
 
     def has_map_of(self, other: EnvironmentArrays) -> bool:
-        """Whether this is the other one, turned or brightened at most: all of their other members are the same."""
+        """True if this is the other one, turned or brightened at most: all of their other members are the same."""
         names = (each.name for each in fields(self) if each.name not in ("rotation", "scale", "key"))
         return all(getattr(self, name) is getattr(other, name) for name in names)
 
@@ -179,12 +179,12 @@ class SceneEdit:
 
     @property
     def needs_kernel(self) -> bool:
-        """Whether the scene may need another kernel after it. Of an edit of the camera, the camera's flags say."""
+        """True if the scene may need another kernel after it. Of an edit of the camera, the camera's flags say."""
         return not self._given.keys() <= {"camera", "environment", "material_numbers"}
 
     @property
     def restarts(self) -> bool:
-        """Whether pictures of the scene begin again after it: all but the numbers change what is seen."""
+        """True if pictures of the scene begin again after it: all but the numbers change what is seen."""
         return not self._given.keys() <= {"material_numbers"}
 
     @property

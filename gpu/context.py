@@ -175,7 +175,7 @@ def dispatch(context: Any, kernel: Any, *groups: int, beside: bool = False) -> N
 
 
 def is_software(context: Any) -> bool:
-    """Whether the context's device is the processor."""
+    """True if the context's device is the processor."""
     renderer = str(context.info["GL_RENDERER"]).lower()
     return any(name in renderer for name in _SOFTWARE)
 

@@ -69,7 +69,7 @@ class CallbackHosts:
         return found
 
     def allows(self, address: Address) -> bool:
-        """Whether callbacks may go to that address: a public one, or one of a network that is named."""
+        """True if callbacks may go to that address: a public one, or one of a network that is named."""
         if any(address in network for network in self.networks if network.version == address.version):
             return True
         inner = _embedded(address)

@@ -200,7 +200,7 @@ def partition_kind(boxes: np.ndarray, index: np.ndarray, kinds: np.ndarray, firs
 
 @jit
 def is_mixed(index: np.ndarray, kinds: np.ndarray, first: int, last: int) -> bool:
-    """Whether these boxes cannot be one leaf: they are of several kinds, or instances, each of which is a leaf."""
+    """True if these boxes cannot be one leaf: they are of several kinds, or instances, each of which is a leaf."""
     kind = kinds[index[first]]
     found = last > first + 1 and kind == INSTANCE
     for i in range(first + 1, last):

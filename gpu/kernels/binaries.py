@@ -68,7 +68,7 @@ class ProgramBinaries:
 
     @property
     def able(self) -> bool:
-        """Whether kernels are kept: not where the processor is the device, whose driver does it well itself."""
+        """True if kernels are kept: not where the processor is the device, whose driver does it well itself."""
         return self._able
 
     def has(self, text: str) -> bool:

@@ -33,12 +33,12 @@ class Sources(NamedTuple):
 
 
 def may_throw(scene: SceneArrays) -> bool:
-    """Whether there are a light and a surface of which paths of light can make something."""
+    """True if there are a light and a surface of which paths of light can make something."""
     return bool(may_be_specular(scene.materials).any()) and bool(_shining(scene).any())
 
 
 def throws(scene: SceneArrays) -> bool:
-    """Whether caustics are better traced from the lights: smooth glass or a mirror, and a light of small extent."""
+    """True if caustics are better traced from the lights: smooth glass or a mirror, and a light of small extent."""
     specular = throws_caustics(scene.materials)
     if not specular.any():
         return False
@@ -60,7 +60,7 @@ def throws(scene: SceneArrays) -> bool:
 
 
 def hides(scene: SceneArrays) -> bool:
-    """Whether there are caustics of lamps without extent, which the camera's paths cannot find."""
+    """True if there are caustics of lamps without extent, which the camera's paths cannot find."""
     kinds, spread = scene.lights["kind"], scene.lights["spread"]
     lamps = np.isin(kinds, _LAMPS) | ((kinds == LightKind.DIRECTIONAL) & (spread <= 0))
     return bool(lamps.any() and throws_caustics(scene.materials).any())

@@ -81,7 +81,7 @@ def evaluating(material: SceneArrays) -> frozenset[str]:
 
 
 def needs_tables(raised: Container[str]) -> bool:
-    """Whether kernels with these flags look up the tables of what microfacets lose."""
+    """True if kernels with these flags look up the tables of what microfacets lose."""
     return any(model.flag in raised for model in TABULATED)
 
 
@@ -92,7 +92,7 @@ NEAR_LIGHTS = frozenset(
 
 
 def draws_towards_lamps(raised: frozenset[str]) -> bool:
-    """Whether distances in media are drawn towards lamps."""
+    """True if distances in media are drawn towards lamps."""
     return raised >= {"HAS_MEDIA", "HAS_SCATTERING"} and not raised.isdisjoint(NEAR_LIGHTS)
 
 
@@ -107,7 +107,7 @@ MOST_SPLATTED = (1 << 27) // SPLAT_BYTES
 
 
 def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
-    """Whether caustics are traced from the lights. With "auto" they are where that errs less at equal time; never
+    """True if caustics are traced from the lights. With "auto" they are where that errs less at equal time; never
     where samples follow what was found, nor where surfaces become rough on the way, nor in pictures that a kernel
     cannot bind as a whole."""
     able = not settings.adaptive and settings.filter_glossy == 0 and settings.width * settings.height <= MOST_SPLATTED
@@ -170,7 +170,7 @@ def _quad_lamp(scene: SceneArrays) -> int:
 
 
 def _shades_once(raised: frozenset[str]) -> bool:
-    """Whether a kernel has the BSDF's code once, for lamps and for the path's own direction. Where that is long, LLVM
+    """True if a kernel has the BSDF's code once, for lamps and for the path's own direction. Where that is long, LLVM
     takes a sixth less time then (11 s instead of 28 with ten models), and samples take
     no longer, but where paths walk below surfaces. A box of matt walls would gain nothing, and lose 15 %."""
     is_longest = not raised.isdisjoint(FILMS) or len([m for m in FLAGGED if m.lobes_flag in raised]) > 3

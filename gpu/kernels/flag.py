@@ -41,5 +41,5 @@ class Flag:
 
 
 def beside(names: tuple[str, ...], raised: frozenset[str]) -> bool:
-    """Whether one of these flags is raised, or they stand for any scene."""
+    """True if one of these flags is raised, or they stand for any scene."""
     return names == ANYWHERE or not raised.isdisjoint(names)

@@ -68,7 +68,7 @@ def _any_of(models: Iterable[Model]) -> Asks:
 
 
 def _optional(member: str) -> Asks:
-    """Whether a material has it above 0: the first channel of one that has several."""
+    """True if a material has it above 0: the first channel of one that has several."""
 
     def asks(s: SceneArrays) -> bool:
         values = s.materials[member]
@@ -99,7 +99,7 @@ def _thin_walls(s: SceneArrays) -> bool:
 
 
 def _goes_straight(s: SceneArrays) -> bool:
-    """Whether there are lights, and surfaces that rays to them pass."""
+    """True if there are lights, and surfaces that rays to them pass."""
     return len(s.lights) > 0 and bool(goes_straight(s.materials).any())
 
 
@@ -109,7 +109,7 @@ def _disperses(s: SceneArrays) -> bool:
 
 
 def _spreads(s: SceneArrays, model: Model) -> bool:
-    """Whether kernels need the lobes of a model: not where all such materials only mirror or refract, and there is
+    """True if kernels need the lobes of a model: not where all such materials only mirror or refract, and there is
     clear glass, so that their paths take the short loop of path/delta_chain.glsl."""
     m = s.materials
     given = of(m, (model,))
@@ -132,7 +132,7 @@ def _slot(flag: int, kind: int = 0) -> Asks:
 
 
 def _normal_mapped(s: SceneArrays) -> bool:
-    """Whether textures bend normals: normal maps or heights."""
+    """True if textures bend normals: normal maps or heights."""
     bending = (*texture_records.NORMALS, texture_records.HEIGHT)
     return s.textures is not None and any(name in s.textures.slots for name in bending)
 
@@ -142,7 +142,7 @@ def _has_heights(s: SceneArrays) -> bool:
 
 
 def _coat_apart(s: SceneArrays) -> bool:
-    """Whether the normal of some coat differs from that of the layer below."""
+    """True if the normal of some coat differs from that of the layer below."""
     if s.textures is None or not _normal_mapped(s):
         return False
     names = list(s.textures.slots)
@@ -165,14 +165,14 @@ def _shines_both(s: SceneArrays) -> bool:
 
 
 def _layered(s: SceneArrays) -> bool:
-    """Whether some emission lies under a coat or fuzz."""
+    """True if some emission lies under a coat or fuzz."""
     m = s.materials
     layers = (m["clearcoat"] > 0) | (m["sheen"] > 0)
     return bool((of(m, COVERING) & layers & (m["emission"] > 0).any(axis=1)).any())
 
 
 def _veiled(s: SceneArrays) -> bool:
-    """Whether the emission or the opacity of an emitting shape varies over its surface."""
+    """True if the emission or the opacity of an emitting shape varies over its surface."""
     shines = (s.materials["emission"] > 0).any(axis=1)
     given = s.materials[shines]
     textured = (given[name] == np.float32(layout.TEXTURED) for name in ("emission", "opacity"))

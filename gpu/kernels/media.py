@@ -10,13 +10,13 @@ from gpu.layout.models import WALKING, of
 
 
 def fills(scene: SceneArrays) -> bool:
-    """Whether something absorbs, scatters or shines along the way, besides what materials absorb, or some body has a
+    """True if something absorbs, scatters or shines along the way, besides what materials absorb, or some body has a
     priority."""
     return len(scene.bodies) > 0
 
 
 def walks(scene: SceneArrays) -> bool:
-    """Whether light walks under a surface, once it has a `subsurface`."""
+    """True if light walks under a surface, once it has a `subsurface`."""
     m = scene.materials
     given = of(m, WALKING) & (m["subsurface"] > 0) & (m["subsurface_radius"] > 0).any(axis=1)
     return bool((given & (m["thin_walled"] == 0)).any())
@@ -44,10 +44,10 @@ def glows(scene: SceneArrays) -> bool:
 
 
 def ranks(scene: SceneArrays) -> bool:
-    """Whether some bodies give way to others."""
+    """True if some bodies give way to others."""
     return bool((scene.bodies["priority"] != 0).any())
 
 
 def attenuates(scene: SceneArrays) -> bool:
-    """Whether light is lost along the way."""
+    """True if light is lost along the way."""
     return bool(_absorbing(scene).any()) or fills(scene) or walks(scene)

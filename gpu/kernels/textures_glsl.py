@@ -54,7 +54,7 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
 
 
 def _opacity_is_in_alpha(textures: TextureArrays) -> bool:
-    """Whether no material takes its opacity from another channel than alpha."""
+    """True if no material takes its opacity from another channel than alpha."""
     if "opacity" not in textures.slots:
         return False
     channels = records(textures)[1]["channel"][:, list(textures.slots).index("opacity")]

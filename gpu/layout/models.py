@@ -156,7 +156,7 @@ BY_NUMBER = {model.number: model for model in MODELS}
 
 
 def of(materials: np.ndarray, models: Iterable[Model]) -> np.ndarray:
-    """Whether each `layout.Material` record is of one of these models."""
+    """True if each `layout.Material` record is of one of these models."""
     out: np.ndarray = np.isin(materials["model"], [model.number for model in models])
     return out
 

@@ -29,7 +29,7 @@ def stop_after(samples: int) -> int:
 
 
 def is_stop(samples: int) -> bool:
-    """Whether passes end at this number of samples."""
+    """True if passes end at this number of samples."""
     return samples > 0 and stop_after(samples - 1) == samples
 
 

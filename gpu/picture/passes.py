@@ -179,7 +179,7 @@ class Passes:
 
     @property
     def _parted(self) -> bool:
-        """Whether samples are summed in blocks."""
+        """True if samples are summed in blocks."""
         return not self._dispatcher.settings.adaptive
 
     def _begin_pass(self, max_samples: int, sharers: int = 1) -> None:
@@ -270,12 +270,12 @@ class Passes:
 
     @property
     def _merges(self) -> bool:
-        """Whether the pass under way ends a block."""
+        """True if the pass under way ends a block."""
         return self._sums.open and self.samples + self._pass_samples == blocks.border_after(self.samples)
 
     @property
     def _meters_beside(self) -> bool:
-        """Whether the noise meter's pixels, too few to fill a GPU, are traced beside the picture's last tile."""
+        """True if the noise meter's pixels, too few to fill a GPU, are traced beside the picture's last tile."""
         d = self._dispatcher
         ready = self.samples >= noise_meter.FROM and not self._light.on and not d.is_software
         fits = d.settings.width * d.settings.height <= d.most_pixels

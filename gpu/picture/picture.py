@@ -111,12 +111,12 @@ class Picture:
 
     @property
     def traces_caustics(self) -> bool:
-        """Whether its caustics are traced from the lights."""
+        """True if its caustics are traced from the lights."""
         return self._light.on
 
     @property
     def at_border(self) -> bool:
-        """Whether it has 8, 16, 32, or a multiple of 64 samples, at which passes end however fast the device is, and
+        """True if it has 8, 16, 32, or a multiple of 64 samples, at which passes end however fast the device is, and
         no pass or shared block is under way."""
         return blocks.is_stop(self.samples) and not self.under_way[0] and not self.block.shared
 
@@ -137,16 +137,16 @@ class Picture:
 
     @property
     def guided(self) -> bool:
-        """Whether AOVs of the first hit are allocated."""
+        """True if AOVs of the first hit are allocated."""
         return bool(self._readout.first_hit.buffers)
 
     @property
     def covered(self) -> bool:
-        """Whether coverage is allocated."""
+        """True if coverage is allocated."""
         return bool(self._readout.coverage.buffers)
 
     def guided_yet(self, coverage: bool = False) -> bool:
-        """Whether any first hit, or its coverage, was traced: then their kernel is compiled."""
+        """True if any first hit, or its coverage, was traced: then their kernel is compiled."""
         return (self._readout.coverage if coverage else self._readout.first_hit).begun
 
     @property
@@ -176,7 +176,7 @@ class Picture:
         return Saved(self.settings, self.samples, self.under_way, out)
 
     def fits(self, saved: Saved, goes_on: bool = True) -> bool:
-        """Whether `saved` is of a picture of this size, and can be restored; with `goes_on`, so that more samples
+        """True if `saved` is of a picture of this size, and can be restored; with `goes_on`, so that more samples
         lead to the same bits, which those of earlier versions do not."""
         sizes, pixels = [data.nbytes for data in saved.buffers], self.settings.width * self.settings.height
         even = [buffer.size for buffer in (*self._sums.total.values(), *self._beside)]

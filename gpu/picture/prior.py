@@ -40,7 +40,7 @@ def prior_bytes(width: int, height: int) -> int:
 
 
 def can_move(camera: np.void) -> bool:
-    """Whether what that camera sees can be seen from elsewhere, with its depth."""
+    """True if what that camera sees can be seen from elsewhere, with its depth."""
     return int(camera["kind"]) == CameraKind.PERSPECTIVE
 
 
@@ -76,7 +76,7 @@ class Prior:
         return prior_bytes(*self.size)
 
     def serves(self, camera: np.void) -> bool:
-        """Whether it can guess what that camera sees."""
+        """True if it can guess what that camera sees."""
         return self._same(camera) or (self._depth is not None and can_move(self.camera) and can_move(camera))
 
     def _same(self, camera: np.void) -> bool:

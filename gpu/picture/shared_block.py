@@ -30,12 +30,12 @@ class SharedBlock:
 
     @property
     def shared(self) -> bool:
-        """Whether the block's samples are traced here and elsewhere."""
+        """True if the block's samples are traced here and elsewhere."""
         return self._sharing is not None
 
     @property
     def own_done(self) -> bool:
-        """Whether this picture's rows of the shared block are complete."""
+        """True if this picture's rows of the shared block are complete."""
         return self._sharing is None or self._sharing.own_done
 
     def allocate(self) -> None:

@@ -78,7 +78,7 @@ def superset_keys(
 
 
 def can_become(old: SceneArrays, new: SceneArrays) -> bool:
-    """Whether the scene differs in its camera, its materials or its environment's turn at most, so that a
+    """True if the scene differs in its camera, its materials or its environment's turn at most, so that a
     `FallbackScene` of it can be edited."""
     edited = ("camera", "materials", "environment")
     same = all(getattr(old, f.name) is getattr(new, f.name) for f in fields(SceneArrays) if f.name not in edited)

@@ -44,11 +44,11 @@ class KernelKey:
 
     @property
     def is_ours(self) -> bool:
-        """Whether its code goes into our own cache, where the device is a GPU."""
+        """True if its code goes into our own cache, where the device is a GPU."""
         return self.entry in ENTRIES
 
     def is_kept(self, info: Mapping[str, Any]) -> bool:
-        """Whether its code is in there, for the driver that `info` (`Renderer.info`) names."""
+        """True if its code is in there, for the driver that `info` (`Renderer.info`) names."""
         return self.is_ours and binary_file(info, self.text).exists()
 
     def digest(self, driver: str) -> str:

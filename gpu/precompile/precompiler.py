@@ -52,7 +52,7 @@ class Precompiler:
         return milliseconds, first_s < _LOADED_S and self._caches()
 
     def _is_faster(self, wanted: KernelKey, first_s: float) -> bool:
-        """Whether a kernel that took `first_s` seconds soon takes much less: the driver has cached it."""
+        """True if a kernel that took `first_s` seconds soon takes much less: the driver has cached it."""
         for look in range(_LOOKS):
             time.sleep(0.002 * 2**look)
             if self._once(wanted) < max(_QUICK_S, first_s / 4):
@@ -60,7 +60,7 @@ class Precompiler:
         return False
 
     def _caches(self) -> bool:
-        """Whether the driver has a disk cache. Then a kernel that gets no faster was in there from the beginning."""
+        """True if the driver has a disk cache. Then a kernel that gets no faster was in there from the beginning."""
         if self._has_cache is None:
             line = 1 + uuid4().int % (1 << 30)  # of which no kernel was made before
             probe = KernelKey(tuple((accumulators.defines() | {"LINE": line}).items()), (), "merge.comp")

@@ -75,7 +75,7 @@ def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, d
 
 
 def _opaque(materials: Mapping[str, Curves]) -> bool:
-    """Whether all polar diagrams lack a lower half."""
+    """True if all polar diagrams lack a lower half."""
     return all(abs(curves.theta).max() <= 90 for curves in materials.values())
 
 

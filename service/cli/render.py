@@ -55,7 +55,7 @@ class Output:
 
     @property
     def is_repeatable(self) -> bool:
-        """Whether the file's metadata says what the picture was made from."""
+        """True if the file's metadata says what the picture was made from."""
         from service.formats import images
 
         return images.FORMATS[self.format].has_metadata

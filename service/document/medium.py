@@ -113,7 +113,7 @@ class Medium(Model):
         return (red, green, blue), (red * share[0], green * share[1], blue * share[2])
 
     def is_empty(self) -> bool:
-        """Whether light passes as through a vacuum."""
+        """True if light passes as through a vacuum."""
         return not any(self.coefficients()[0]) and not any(self.emission)
 
 

@@ -93,7 +93,7 @@ def among(names: Iterable[str]) -> str:
 
 
 def _is_below(pointer: str, holders: set[str]) -> bool:
-    """Whether one of the holders, which end with a slash, leads to it."""
+    """True if one of the holders, which end with a slash, leads to it."""
     at = pointer.find("/")
     while at >= 0:
         if pointer[: at + 1] in holders:

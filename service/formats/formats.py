@@ -142,6 +142,6 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
 
 
 def _is_usdz(head: bytes) -> bool:
-    """Whether the first file of a zip is a layer of USD, as the format demands."""
+    """True if the first file of a zip is a layer of USD, as the format demands."""
     name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
     return name.decode("utf-8", "replace").lower().endswith(USD_LAYERS)

@@ -71,7 +71,7 @@ class ImageData:
 
     @property
     def is_8bit(self) -> bool:
-        """Whether the texels are bytes as the file has them, not floats."""
+        """True if the texels are bytes as the file has them, not floats."""
         return self.pixels.dtype == np.uint8
 
 

@@ -132,18 +132,18 @@ class Update:
 
     @property
     def is_large(self) -> bool:
-        """Whether copying it to shared memory is too much for the event loop."""
+        """True if copying it to shared memory is too much for the event loop."""
         return self.scene is not None or (self.edit is not None and self.edit.bytes > LARGE)
 
     @property
     def may_not_fit(self) -> bool:
-        """Whether the device may have no memory for what it brings."""
+        """True if the device may have no memory for what it brings."""
         lit = self.edit is not None and self.edit.environment_map is not None
         return self.scene is not None or self.settings is not None or lit
 
     @property
     def restarts(self) -> bool:
-        """Whether accumulation starts again."""
+        """True if accumulation starts again."""
         return self.scene is not None or self.settings is not None or (self.edit is not None and self.edit.restarts)
 
     def then(self, later: Update) -> Update:

@@ -34,7 +34,7 @@ class MovedMeshes:
     def apart(
         self, shapes: Sequence[Shape], contents: Sequence[Hashable], triangles: Callable[[MeshShape], int]
     ) -> bool:
-        """Whether the scene has a mesh that was moved, now or before. `contents` are the shapes' `cache.content`."""
+        """True if the scene has a mesh that was moved, now or before. `contents` are the shapes' `cache.content`."""
         here = {_still(each) for each in contents}
         for shape, old, new in zip(shapes, self._before, contents, strict=False):
             still = _still(new)
@@ -157,5 +157,5 @@ def digest(value: Any) -> Hashable:
 
 
 def lasting(reference: str | None) -> bool:
-    """Whether a reference always names the same bytes: an asset's id does, a path does not."""
+    """True if a reference always names the same bytes: an asset's id does, a path does not."""
     return reference is None or reference.startswith("sha256:")

@@ -52,7 +52,7 @@ def scene_edit(old: SceneArrays, new: SceneArrays) -> SceneEdit | None:
 
 
 def _alike(a: EnvironmentArrays | None, b: EnvironmentArrays | None) -> bool:
-    """Whether kernels read both scenes in the same way."""
+    """True if kernels read both scenes in the same way."""
     if a is None or b is None:
         return a is b
     kinds = [(e.cube, e.sun is None, e.texels.size > 3) for e in (a, b)]

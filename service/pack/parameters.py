@@ -135,7 +135,7 @@ def member_of(material: Material, name: str) -> str:
 
 
 def has_terms(model: str) -> bool:
-    """Whether a model, by its name, has a distribution, a geometry and a Fresnel term."""
+    """True if a model, by its name, has a distribution, a geometry and a Fresnel term."""
     return models.BY_NUMBER[models.NUMBERS[model]].has_terms
 
 

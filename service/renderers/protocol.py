@@ -67,7 +67,7 @@ class Renderers(Protocol):
 
     @property
     def hopeless(self) -> bool:
-        """Whether all attempts to start any renderer failed, so that the next one is some time away."""
+        """True if all attempts to start any renderer failed, so that the next one is some time away."""
 
     def start(self) -> None:
         """Start the processes, where that has not been done; they are ready some tenths of a second later."""

@@ -66,7 +66,7 @@ class ReplayLog:
 
     @property
     def away(self) -> bool:
-        """Whether it is a stream's that nobody attends."""
+        """True if it is a stream's that nobody attends."""
         return isinstance(self._paused, Pause) and self._paused.away
 
     @property

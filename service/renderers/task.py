@@ -21,5 +21,5 @@ class Task:
 
     @property
     def active(self) -> bool:
-        """Whether it takes a renderer's time, as an attended stream does, and a render until it has ended."""
+        """True if it takes a renderer's time, as an attended stream does, and a render until it has ended."""
         return self.record.saved is None and not self.record.away

@@ -230,7 +230,7 @@ def owner_of(connection: HTTPConnection) -> str:
 
 
 def bodiless(connection: HTTPConnection) -> bool:
-    """Whether the request is for the head of the answer only."""
+    """True if the request is for the head of the answer only."""
     return bool(connection.scope.get("bodiless", False))
 
 

@@ -35,7 +35,7 @@ class RunnableTime:
 
 
 def answers(link: socket.socket, pid: int, seconds: float) -> bool:
-    """Whether a message comes on `link` within `seconds` in which the process was able to run."""
+    """True if a message comes on `link` within `seconds` in which the process was able to run."""
     poll = select.poll()
     poll.register(link, select.POLLIN)
     runnable, left = RunnableTime(pid), seconds

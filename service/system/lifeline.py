@@ -28,7 +28,7 @@ def end_with_pipe(descriptor: int) -> bool:
 
 
 def hung_up(end: int) -> bool:
-    """Whether nobody holds the other end any more."""
+    """True if nobody holds the other end any more."""
     poll = select.poll()
     poll.register(end, 0)
     return bool(poll.poll(0))

@@ -95,7 +95,7 @@ class Shares:
         raise Unavailable(f"There is no room for more {self._what} just now.", self._retry_s)
 
     def has_room(self, caller: str, n: int = 1) -> bool:
-        """Whether `take` would take `n` units."""
+        """True if `take` would take `n` units."""
         return self._taken[caller] + n <= self._share(caller)
 
     def _share(self, caller: str) -> int:

@@ -36,12 +36,12 @@ class BsdfTask:
 
     @property
     def unseen(self) -> bool:
-        """Whether it goes first: an answer that takes more than one slice has no preference from then on."""
+        """True if it goes first: an answer that takes more than one slice has no preference from then on."""
         return self.ready and not self._begun
 
     @property
     def loads(self) -> bool:
-        """Whether its next turn may take as long as a compilation does."""
+        """True if its next turn may take as long as a compilation does."""
         return not self._begun
 
     def turn(self) -> None:

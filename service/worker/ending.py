@@ -47,7 +47,7 @@ class Ending:
 
     @property
     def kept(self) -> bool:
-        """Whether the server keeps this picture: it does those of renders, not those of streams."""
+        """True if the server keeps this picture: it does those of renders, not those of streams."""
         return self._server_keeps and not self._tracker.interactive
 
     def checkpoint(self) -> bool:

@@ -82,7 +82,7 @@ def has_power_to_spare() -> bool:
 
 
 def _on_battery() -> bool:
-    """Whether there is a battery and no adapter is plugged in."""
+    """True if there is a battery and no adapter is plugged in."""
     kinds = [(_read(each / "type"), _read(each / "online")) for each in SUPPLIES.glob("*")]
     return any(kind == "Battery" for kind, _ in kinds) and ("Mains", "1") not in kinds and ("USB", "1") not in kinds
 
@@ -159,5 +159,5 @@ def _begin(device: int | None) -> None:
 
 
 def _compile(key: KernelKey) -> bool:
-    """Whether the driver keeps it. Raises CompileError."""
+    """True if the driver keeps it. Raises CompileError."""
     return _compiling[0].compile(key)[1]

@@ -238,7 +238,7 @@ def judged_from(samples: float) -> int:
 
 
 def late(stop: StopRule, now_s: float, sample_s: float, even: bool) -> bool:
-    """Whether time is up. A pass under way (not `even`) may be finished, and one that nearly fits begun."""
+    """True if time is up. A pass under way (not `even`) may be finished, and one that nearly fits begun."""
     if stop.time_limit is None:
         return False
     overrun_s = 0.05 * stop.time_limit + 0.05  # half of what the contract allows: a slice is not to be halted

@@ -59,15 +59,15 @@ class Turn(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Whether it has something to do."""
+        """True if it has something to do."""
 
     @property
     def unseen(self) -> bool:
-        """Whether somebody waits for its first frame."""
+        """True if somebody waits for its first frame."""
 
     @property
     def wanted(self) -> bool:
-        """Whether somebody waits for its next frame."""
+        """True if somebody waits for its next frame."""
 
 
 T = TypeVar("T", bound=Turn)

@@ -37,12 +37,12 @@ class Task:
 
     @property
     def wanted(self) -> bool:
-        """Whether a frame is wanted."""
+        """True if a frame is wanted."""
         return self.picture.frames.want is not None
 
     @property
     def ready(self) -> bool:
-        """Whether a turn would do anything."""
+        """True if a turn would do anything."""
         picture, phase = self.picture, self.picture.phase
         if (self._away and not self._later) or phase is Phase.EMPTY:
             return False
@@ -55,17 +55,17 @@ class Task:
 
     @property
     def unseen(self) -> bool:
-        """Whether a person waits for the first frame of something."""
+        """True if a person waits for the first frame of something."""
         return self.picture.unseen
 
     @property
     def loads(self) -> bool:
-        """Whether its next turn may take as long as a compilation does."""
+        """True if its next turn may take as long as a compilation does."""
         return self.picture.loads
 
     @property
     def idle(self) -> bool:
-        """Whether its memory on the device may be taken."""
+        """True if its memory on the device may be taken."""
         picture, frames = self.picture, self.picture.frames
         waited_for = self.ready or picture.home.waiting or frames.awaited or frames.denoising.pending
         return picture.residency.loaded is not None and not waited_for
@@ -97,7 +97,7 @@ class Task:
         self.picture.updates.join(update)
 
     def defers(self, message: ToRenderer) -> bool:
-        """Whether the task keeps the message until the pending update is applied, for which its kernel may have to be
+        """True if the task keeps the message until the pending update is applied, for which its kernel may have to be
         compiled first: one that asks for that, and those behind it, but for the last."""
         if isinstance(message, Drop):
             return False

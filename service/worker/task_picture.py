@@ -73,12 +73,12 @@ class TaskPicture:
 
     @property
     def waiting(self) -> bool:
-        """Whether there is nothing to trace or to save here before an assistant answers."""
+        """True if there is nothing to trace or to save here before an assistant answers."""
         return self.home.waiting and not self.ending.checkpoints.hastened
 
     @property
     def unseen(self) -> bool:
-        """Whether a person waits for the first frame of something."""
+        """True if a person waits for the first frame of something."""
         updates, pending, interactive = self.updates, self.updates.pending, self.tracker.interactive
         if updates.previews:
             return not updates.previewed
@@ -88,7 +88,7 @@ class TaskPicture:
 
     @property
     def loads(self) -> bool:
-        """Whether the next step may take as long as a compilation does."""
+        """True if the next step may take as long as a compilation does."""
         return self.phase in (Phase.COMPILING, Phase.UPDATING)
 
     def step(self, paused: bool, only_applies: bool = False) -> None:
@@ -164,7 +164,7 @@ class TaskPicture:
 
     @property
     def _divides(self) -> bool:
-        """Whether parts of the picture may be traced elsewhere."""
+        """True if parts of the picture may be traced elsewhere."""
         settings, stop = self.residency.full.settings, self.tracker.stop
         return undivided(settings.adaptive, stop.time_limit) is None
 

@@ -41,17 +41,17 @@ class Updates:
 
     @property
     def compiling(self) -> bool:
-        """Whether the pending update waits for its kernel."""
+        """True if the pending update waits for its kernel."""
         return self._wait.compiling
 
     @property
     def previews(self) -> bool:
-        """Whether there is a slice to trace of what shows the pending update meanwhile."""
+        """True if there is a slice to trace of what shows the pending update meanwhile."""
         return self.compiling and self._fallback.due
 
     @property
     def previewed(self) -> bool:
-        """Whether that shows something already."""
+        """True if that shows something already."""
         return self._fallback.scale is not None
 
     @property
@@ -88,7 +88,7 @@ class Updates:
         return self._edited
 
     def begin_to_wait(self, update: Update, paused: bool) -> bool:
-        """Whether the update's kernel is being compiled, so that the update has to wait for it. Where it cannot be,
+        """True if the update's kernel is being compiled, so that the update has to wait for it. Where it cannot be,
         `check` says so."""
         self._request = self._refusal = None
         if self._wait.compiler is None:
@@ -111,7 +111,7 @@ class Updates:
             raise self._refusal
 
     def _waits_for(self, key: KernelKey, request: KernelRequest, generation: int, watched: bool) -> bool:
-        """Whether this kernel is being compiled, which may be shown by another one meanwhile."""
+        """True if this kernel is being compiled, which may be shown by another one meanwhile."""
         assert self._wait.compiler is not None
         shows = watched and not self._wait.compiler.needs_no_wait(key)
         at_once = shows and self._fallback.can(request)

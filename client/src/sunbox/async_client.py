@@ -145,7 +145,7 @@ class AsyncClient:
     async def compare(
         self, a: Any, b: Any, confidence: float = 0.999, map: str | None = None, **settings: Any
     ) -> verdicts.Verdict:
-        """Whether two pictures differ beyond noise. Each side is a scene, `{"scene": ..., "settings": ...}`, a render
+        """A verdict on whether two pictures differ. Each side is a scene, `{"scene": ..., "settings": ...}`, a render
         (a job or its id), or an EXR file with every layer (its path, or its id on the server). Scenes are rendered
         with the same seeds, up to the `max_samples` of their settings, to which `settings` are added. `map`: p,
         difference, flip or heat also brings a picture of where they differ. Cancelled, it ends the work."""

@@ -108,7 +108,7 @@ class Client:
         return Stream(self._client.stream(scene, format, **settings))
 
     def compare(self, a: Any, b: Any, confidence: float = 0.999, map: str | None = None, **settings: Any) -> Verdict:
-        """Whether two scenes, renders or EXR files differ beyond noise. Ctrl-C ends the work."""
+        """A verdict on whether two scenes, renders or EXR files differ. Ctrl-C ends the work."""
         return run(self._client.compare(a, b, confidence, map, **settings))
 
     def upload(self, file: str | Path | bytes, name: str = "") -> str:

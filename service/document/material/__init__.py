@@ -52,7 +52,7 @@ MODELS: dict[str, type[AnySurface]] = {model.name(): model for model in get_args
 
 
 def stretches(material: Material) -> bool:
-    """Whether the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices. Of
+    """True if the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices. Of
     one that was measured its file would say so."""
     if isinstance(material, MeasuredMaterial):
         return True

@@ -74,7 +74,7 @@ class Parameter:
         return float(low + high) / 2
 
     def means(self, other: Parameter | None) -> bool:
-        """Whether it means the same as that of another model. `specular` is an amount here and a colour there;
+        """True if it means the same as that of another model. `specular` is an amount here and a colour there;
         `alpha` is the opacity, or a distribution's parameter whose range depends on that."""
         return other is not None and all(self.hints.get(n) == other.hints.get(n) for n in ("x-widget", "x-ranges"))
 
@@ -152,7 +152,7 @@ def _color_name(of: Mapping[str, Parameter], document: Document) -> str | None:
 
 
 def _is_plain(old: Document) -> bool:
-    """Whether it has a roughness, and no texture decides on the highlight."""
+    """True if it has a roughness, and no texture decides on the highlight."""
     return "roughness" in old and not any(isinstance(old.get(name), dict) for name in _WIDTHS)
 
 

@@ -367,7 +367,7 @@ class OpenpbrMaterial(AnySurface):
         return {"diffuse_transmission": through}
 
     def is_filled(self) -> bool:
-        """Whether it says by itself what is under its surface."""
+        """True if it says by itself what is under its surface."""
         walks = subsurface.factor_of(self.subsurface_weight) > 0 and self.subsurface_radius > 0
         return (walks or self.transmission_depth > 0) and not self.geometry_thin_walled
 

@@ -279,13 +279,13 @@ class PrincipledMaterial(DisneyMaterial):
 
     @property
     def is_thin(self) -> bool:
-        """Whether its surfaces are walls without an inside: those that pass diffuse light always are."""
+        """True if its surfaces are walls without an inside: those that pass diffuse light always are."""
         through = self.diffuse_transmission
         passes = through.factor > 0 if isinstance(through, ScalarTexture) else through > 0
         return self.thin_walled or passes
 
     def is_filled(self) -> bool:
-        """Whether it says by itself what is under its surface."""
+        """True if it says by itself what is under its surface."""
         walks = self.subsurface_radius is not None and max(self.subsurface_radius) > 0
         return walks and factor_of(self.subsurface) > 0 and not self.is_thin
 

@@ -69,7 +69,7 @@ class AnySurface(Model):
         return {}
 
     def is_filled(self) -> bool:
-        """Whether it says by itself what is under its surface."""
+        """True if it says by itself what is under its surface."""
         return False
 
     @classmethod

@@ -46,7 +46,7 @@ class Materials:
         return self._known[key]
 
     def is_single_sided(self, name: str) -> bool:
-        """Whether light leaves its front only, which glTF has for single-sided surfaces alone."""
+        """True if light leaves its front only, which glTF has for single-sided surfaces alone."""
         material = self.scene.materials[name]
         return _shines(material) and material.emission_sides == "front"
 
@@ -73,7 +73,7 @@ class Materials:
 
 
 def is_unlit(material: Material, double_sided: bool) -> TypeGuard[DiffuseMaterial]:
-    """Whether it is nothing but a glow, as the importer has it for KHR_materials_unlit."""
+    """True if it is nothing but a glow, as the importer has it for KHR_materials_unlit."""
     if not isinstance(material, DiffuseMaterial) or material.albedo != BLACK:
         return False
     color = material.emission
@@ -88,7 +88,7 @@ def _shines(material: AnySurface) -> bool:
 
 
 def _transmits(material: AnySurface) -> bool:
-    """Whether it is a body that light goes through; thin walls are none."""
+    """True if it is a body that light goes through; thin walls are none."""
     if getattr(material, "is_thin", getattr(material, "geometry_thin_walled", False)):
         return False
     found = getattr(material, "transmission", 0.0)

@@ -164,7 +164,7 @@ class Meshes:
 
 
 def _same(a: PlacedMesh, b: PlacedMesh) -> bool:
-    """Whether two meshes render the same where the scene's origin is 0, as in most."""
+    """True if two meshes render the same where the scene's origin is 0, as in most."""
     if not np.array_equal(a.vertices.astype(np.float32), b.vertices.astype(np.float32)):
         return False
     if a.normals is None or b.normals is None:

@@ -50,7 +50,7 @@ class Inputs(ABC):
 
     @abstractmethod
     def is_given(self, name: str) -> bool:
-        """Whether the file says anything about an input."""
+        """True if the file says anything about an input."""
 
     @abstractmethod
     def fixed(self, tree: Tree) -> Any:
@@ -83,7 +83,7 @@ class Inputs(ABC):
         """Warn at the place of an input."""
 
     def is_set(self, name: str) -> bool:
-        """Whether a switch is on."""
+        """True if a switch is on."""
         found = self.constant(name)
         return found is not None and found[0] > 0
 
@@ -114,7 +114,7 @@ class Inputs(ABC):
         return red, green, blue
 
     def is_used(self, name: str, neutral: float) -> bool:
-        """Whether an input is other than the value by which it does nothing."""
+        """True if an input is other than the value by which it does nothing."""
         found = self.constant(name)
         return found is None or any(abs(one - neutral) > 1e-6 for one in found)
 

@@ -41,7 +41,7 @@ class PlainInputs(Inputs):
 
     @abstractmethod
     def is_textured(self, name: str) -> bool:
-        """Whether an input differs from place to place. It is asked of inputs that may not be read at all."""
+        """True if an input differs from place to place. It is asked of inputs that may not be read at all."""
 
     def tree(self, name: str) -> Tree:
         if name not in self._trees:

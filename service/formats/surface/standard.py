@@ -47,7 +47,7 @@ def standard_surface(s: Inputs) -> None:
 
 
 def _suits_openpbr(s: Inputs) -> bool:
-    """Whether more is used that only `openpbr` has than what only `principled` has."""
+    """True if more is used that only `openpbr` has than what only `principled` has."""
     is_thin = s.is_set("thin_walled")
     if s.is_used("subsurface", 0):
         return not is_thin
@@ -203,7 +203,7 @@ def _coat(s: Inputs) -> None:
 
 
 def _roughens(s: Inputs) -> bool:
-    """Whether the coat of `openpbr` makes what is under it rougher than the file says."""
+    """True if the coat of `openpbr` makes what is under it rougher than the file says."""
     affects = s.constant("coat_affect_roughness")
     if affects == [1.0]:
         return False

@@ -133,7 +133,7 @@ class AnalyticShapes:
                 self.quad(origin, u, v, placed, used, is_round=True)
 
     def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
-        """Whether the shape is large enough for float32; records one that is not. Raises InvalidDocument where its
+        """True if the shape is large enough for float32; records one that is not. Raises InvalidDocument where its
         transform puts it out of range."""
         check_reach(used[1], max(*map(abs, position), *lengths))
         if min(lengths) < LEAST:

@@ -136,7 +136,7 @@ class Triangles:
         return any(mesh.tangents is not None for mesh in self.meshes)
 
     def have(self, name: str) -> bool:
-        """Whether a mesh has `uvs`, `uvs_1` or `colors`."""
+        """True if a mesh has `uvs`, `uvs_1` or `colors`."""
         return any(getattr(mesh, name) is not None for mesh in self.meshes)
 
     def doubled_areas(self) -> np.ndarray:

@@ -107,7 +107,7 @@ def same(*columns: np.ndarray) -> np.ndarray:
 
 
 def _same(column: np.ndarray, first: np.ndarray, place: np.ndarray) -> bool:
-    """Whether all rows that have the same number are equal."""
+    """True if all rows that have the same number are equal."""
     rows = column.take(first, axis=0)
     return all(np.array_equal(rows.take(place[some], axis=0), column[some]) for some in chunks(len(column)))
 

@@ -118,7 +118,7 @@ def _spots(out: LightBounds, mine: np.ndarray, spots: np.ndarray) -> None:
 
 
 def worth(b: LightBounds) -> bool:
-    """Whether a tree pays: a sample then costs 1.1 to 1.4 times as much. Two lamps some metres apart still have an
+    """True if a tree pays: a sample then costs 1.1 to 1.4 times as much. Two lamps some metres apart still have an
     error 1.4 to 2.9 times smaller after equal time; the two triangles of a rectangle gain nothing."""
     middles = 0.5 * (b.low + b.high)
     if not 2 <= len(middles) < MANY:

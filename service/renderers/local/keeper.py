@@ -102,7 +102,7 @@ class Keeper:
 
     @property
     def takes_tasks(self) -> bool:
-        """Whether it takes tasks; they wait while the process starts or is replaced."""
+        """True if it takes tasks; they wait while the process starts or is replaced."""
         return self._ready is not None and not self._draining and not self.restarts.hopeless
 
     @property

@@ -276,7 +276,7 @@ async def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | No
 
 
 def _is_stopped(pid: int) -> bool:
-    """Whether the process is stopped (SIGSTOP, a debugger): then its silence is not the work's fault."""
+    """True if the process is stopped (SIGSTOP, a debugger): then its silence is not the work's fault."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] in "Tt"
     except OSError:

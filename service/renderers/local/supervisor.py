@@ -124,12 +124,12 @@ class Supervisor:
 
     @property
     def takes_tasks(self) -> bool:
-        """Whether it takes tasks; they wait while its process starts or is replaced."""
+        """True if it takes tasks; they wait while its process starts or is replaced."""
         return self._keeper.takes_tasks
 
     @property
     def replaces(self) -> bool:
-        """Whether something rendered here, and does or will again soon."""
+        """True if something rendered here, and does or will again soon."""
         return self.driver is not None and self.takes_tasks
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:

@@ -211,13 +211,13 @@ class Pool:
             self.move(number, best)
 
     def _is_at_driver(self, number: int, driver: str) -> bool:
-        """Whether it is with a renderer of that driver, or gone."""
+        """True if it is with a renderer of that driver, or gone."""
         home = self.homes.get(number)
         return home is None or home.driver == driver
 
     @property
     def _starts(self) -> bool:
-        """Whether a renderer is being started that was never ready."""
+        """True if a renderer is being started that was never ready."""
         return any(each.driver is None and each.takes_tasks and not each.waiting for each in self.supervisors)
 
     def move(self, number: int, home: Supervisor) -> None:

@@ -55,7 +55,7 @@ def join(ask: Join) -> bool:
 
 
 def has_token() -> bool:
-    """Whether this process shows a token to the cluster, and takes requests with that token alone."""
+    """True if this process shows a token to the cluster, and takes requests with that token alone."""
     from ray._private.authentication.authentication_utils import is_token_auth_enabled
 
     return bool(is_token_auth_enabled())
@@ -109,7 +109,7 @@ def _nodes(ask: Join) -> list[dict[str, float]]:
 
 
 def _runs_here() -> bool:
-    """Whether the cluster that was started here last still runs; Ray would wait for one that was killed."""
+    """True if the cluster that was started here last still runs; Ray would wait for one that was killed."""
     from ray._private.utils import read_ray_address
 
     address = read_ray_address()

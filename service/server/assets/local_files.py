@@ -62,7 +62,7 @@ class FileAssets:
             return file.read()
 
     def holds(self, ref: str) -> bool:
-        """Whether such a file exists. Raises AssetError for a path that may not be read."""
+        """True if such a file exists. Raises AssetError for a path that may not be read."""
         return _exists(self._find(ref))
 
     def add(self, ref: str) -> None:

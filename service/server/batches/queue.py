@@ -216,7 +216,7 @@ class BatchQueue:
             await self._changed(batch, AGAIN_S)
 
     async def _queued(self, job: Render, batch: Batch, step: int) -> bool:
-        """Whether there was room for it in line. A batch that was cancelled meanwhile takes it out again."""
+        """True if there was room for it in line. A batch that was cancelled meanwhile takes it out again."""
         batch.queueing = True
         try:
             await self._renders.submit_member(job, batch, step)

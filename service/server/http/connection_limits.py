@@ -82,7 +82,7 @@ class Room:
         self._is_proxy = lru_cache(4096)(self._within_proxies)
 
     def enter(self, connection: Any, connections: Collection[Any]) -> bool:
-        """Whether a new connection, already in `connections`, may stay. Where room is needed an idle one is closed.
+        """True if a new connection, already in `connections`, may stay. Where room is needed an idle one is closed.
 
         False: refuse it. Where too many refused ones are open, the first of them is closed.
         """
@@ -145,7 +145,7 @@ def _least(connection: Any) -> float:
 
 
 def _is_http(connection: Any) -> bool:
-    """Whether a connection of uvicorn's is HTTP and not a WebSocket."""
+    """True if a connection of uvicorn's is HTTP and not a WebSocket."""
     return hasattr(connection, "cycle")
 
 

@@ -107,7 +107,7 @@ class Written:
 
     @property
     def is_modest(self) -> bool:
-        """Whether as many as stay would leave room for others."""
+        """True if as many as stay would leave room for others."""
         return self.bytes <= (SMALL if self._held is not None else ROOM // (2 * LASTING))
 
 

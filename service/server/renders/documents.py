@@ -41,7 +41,7 @@ class WaitingDocuments:
             self.count(render, size)
 
     def take_reserve(self, render: Waiting, size: int) -> bool:
-        """Whether a new one may use what is reserved of the quota, since its client takes little of that."""
+        """True if a new one may use what is reserved of the quota, since its client takes little of that."""
         if self._reserve is None:
             return False
         try:

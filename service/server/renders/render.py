@@ -208,7 +208,7 @@ class Render(Listener):
 
     @property
     def lasting(self) -> bool:
-        """Whether it is stored: it outlives the server, and may be interrupted."""
+        """True if it is stored: it outlives the server, and may be interrupted."""
         return self.recorder is not None
 
     @property
@@ -375,7 +375,7 @@ class Render(Listener):
 
     @property
     def can_give_way(self) -> bool:
-        """Whether another render may have its slot: it has got on since it began, and its samples can be stored."""
+        """True if another render may have its slot: it has got on since it began, and its samples can be stored."""
         runs = self.task is not None and not (self.ends or self._gives_way or self.over.is_set())
         got_on = isinstance(self.at, Tracing) and self.outcome.progress.samples > self._least_samples
         return self.recorder is not None and runs and got_on
@@ -417,7 +417,7 @@ class Render(Listener):
 
     @property
     def ends(self) -> bool:
-        """Whether it has ended, or is known to end as soon as that is stored."""
+        """True if it has ended, or is known to end as soon as that is stored."""
         return self.finished.is_set() or self._ending is not None
 
     def cancel(self) -> None:

@@ -200,7 +200,7 @@ class Resting:
 
 
 def _rests(job: Render) -> bool:
-    """Whether a renderer has its picture and adds nothing to it: it ended, or it gave way and was looked at."""
+    """True if a renderer has its picture and adds nothing to it: it ended, or it gave way and was looked at."""
     return job.resident_bytes > 0 and (job.finished.is_set() or job.picture_at is PictureAt.BOTH)
 
 

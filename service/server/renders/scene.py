@@ -31,7 +31,7 @@ class PackedScenes:
         self._lock = threading.Lock()
 
     def keep(self, scene: RenderScene, size: int) -> bool:
-        """Whether there is room for it."""
+        """True if there is room for it."""
         with self._lock:
             if self.bytes + size > self._most:
                 return False

@@ -70,7 +70,7 @@ class Slots:
         self._since[job] = self._clock()
 
     def remove(self, job: Render) -> bool:
-        """Whether it was waiting."""
+        """True if it was waiting."""
         self._lacking.pop(job, None)
         self._tried.pop(job, None)
         self._since.pop(job, None)
@@ -99,7 +99,7 @@ class Slots:
         return self._most - max(len(self._running), stay + (self._claim is not None))
 
     def _may_have_one(self, owner: str) -> bool:
-        """Whether an owner may have a slot that is free. While several owners have renders here, or had within the
+        """True if an owner may have a slot that is free. While several owners have renders here, or had within the
         last minute, the last one is for owners who have none: they would wait until somebody has given way."""
         running = {job.owner for job in self._running.values()}
         if self._free > 1 or not owner or owner not in running:
@@ -150,7 +150,7 @@ class Slots:
         self._tried[job] = None
 
     def _fits(self, job: Render) -> bool:
-        """Whether it may begin now; its memory is counted then."""
+        """True if it may begin now; its memory is counted then."""
         if job in self._tried or self._held_back(job) or not self._in_share(job):
             return False
         if job.reserve():
@@ -159,7 +159,7 @@ class Slots:
         return False
 
     def _held_back(self, job: Render) -> bool:
-        """Whether it would take memory that another one has waited for: so no stream of renders starves a large one.
+        """True if it would take memory that another one has waited for: so no stream of renders starves a large one.
 
         Only for half of the time, as what that one waits for may be endless."""
         first = next(iter(self._lacking), job)
@@ -167,7 +167,7 @@ class Slots:
         return first is not job and int(waited / PATIENCE_S) % 2 == 1 and job.memory_share > 1 / (SMALL * self._most)
 
     def _in_share(self, job: Render) -> bool:
-        """Whether it may have a slot that it cannot give back: of these an owner leaves half to the others."""
+        """True if it may have a slot that it cannot give back: of these an owner leaves half to the others."""
         if job.lasting or not job.owner:
             return True
         fixed = Counter(each.owner for each in self._running.values() if not each.lasting)
@@ -190,7 +190,7 @@ class Slots:
                 return
 
     def _waited_enough(self, waiting: Render, waited_s: float) -> bool:
-        """Whether others may give way to it. They do so soon where its client has nothing, and has had little lately
+        """True if others may give way to it. They do so soon where its client has nothing, and has had little lately
         or lacks a slot alone, of which another client has several."""
         if not SOON_S <= waited_s < WAIT_S:
             return waited_s >= WAIT_S

@@ -22,7 +22,7 @@ class Waiting(Protocol):
 
     @property
     def began(self) -> bool:
-        """Whether it was running when the server ended, or gave way: it goes on before its owner's others begin."""
+        """True if it was running when the server ended, or gave way: it goes on before its owner's others begin."""
 
 
 T = TypeVar("T", bound=Waiting)
@@ -63,7 +63,7 @@ class Turns(Generic[T]):
         insort(self._queues.setdefault(render.owner, []), render, key=_key)
 
     def remove(self, render: T) -> bool:
-        """Whether it was waiting."""
+        """True if it was waiting."""
         index = self._find(render)
         if index is not None:
             queue = self._queues[render.owner]

@@ -58,7 +58,7 @@ class PictureViewer(Listener):
 
     @property
     def busy(self) -> bool:
-        """Whether somebody waits for an image."""
+        """True if somebody waits for an image."""
         return bool(self._reads or self._waiting)
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:

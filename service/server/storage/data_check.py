@@ -159,7 +159,7 @@ def reading(path: Path) -> sqlite3.Connection:
 
 
 def _is_locked(path: Path) -> bool:
-    """Whether a process is writing the file just now, or it is gone meanwhile."""
+    """True if a process is writing the file just now, or it is gone meanwhile."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

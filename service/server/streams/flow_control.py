@@ -70,7 +70,7 @@ class FlowControl:
         self._ask()
 
     def welcome(self, frame: Frame) -> bool:
-        """Whether this frame may still be sent. If not, another one is asked for."""
+        """True if this frame may still be sent. If not, another one is asked for."""
         if frame.serial != self._serial:
             return False  # the view was changed, and asked for anew
         if frame.generation == self.generation:

@@ -183,7 +183,7 @@ def readable() -> Iterator[Path]:
 
 
 def _drop_capabilities(libc: ctypes.CDLL, calls: SystemCalls | None) -> bool:
-    """Whether there are none any more, also not for a program that this process would start."""
+    """True if there are none any more, also not for a program that this process would start."""
     libc.prctl(PR_CAP_AMBIENT, CLEAR_ALL, 0, 0, 0)
     for capability in range(LAST_CAPABILITY + 1):
         libc.prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)

@@ -48,7 +48,7 @@ class Checkpointer:
 
     @property
     def hastened(self) -> bool:
-        """Whether the next checkpoint is due now, whatever else there is to do."""
+        """True if the next checkpoint is due now, whatever else there is to do."""
         return self._ended_at == -math.inf
 
     def hasten(self) -> None:
@@ -56,7 +56,7 @@ class Checkpointer:
         self._ended_at = -math.inf
 
     def due(self, picture: Picture, elapsed_s: float) -> bool:
-        """Whether the picture under way, which has taken that many seconds, is to be saved as it is now."""
+        """True if the picture under way, which has taken that many seconds, is to be saved as it is now."""
         begun = picture.samples > 0 or picture.under_way[0] > 0  # the first sample of a large picture takes seconds
         pause_s = self._pause_s(elapsed_s) * (EARLY if _is_small(picture) else 1.0)
         return begun and time.monotonic() >= self._ended_at + pause_s
@@ -98,6 +98,6 @@ class Checkpointer:
 
 
 def _is_small(picture: Picture) -> bool:
-    """Whether no block of samples is under way, whose sums would be saved beside those of the whole blocks."""
+    """True if no block of samples is under way, whose sums would be saved beside those of the whole blocks."""
     ended = picture.samples > 0 and border_after(picture.samples - 1) == picture.samples
     return ended and picture.at_border and not picture.settings.adaptive

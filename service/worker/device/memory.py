@@ -24,7 +24,7 @@ class Evictable(Protocol):
 
     @property
     def idle(self) -> bool:
-        """Whether its memory on the device can be taken, and restored later."""
+        """True if its memory on the device can be taken, and restored later."""
 
     def evict(self) -> None: ...
 

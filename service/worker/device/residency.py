@@ -33,7 +33,7 @@ class Residency:
 
     @property
     def there(self) -> bool:
-        """Whether there is a scene, on the device or offloaded."""
+        """True if there is a scene, on the device or offloaded."""
         return self.loaded is not None or self._offloaded is not None
 
     @property

@@ -46,12 +46,12 @@ class Assistant:
 
     @property
     def loads(self) -> bool:
-        """Whether its next turn may take as long as a compilation does."""
+        """True if its next turn may take as long as a compilation does."""
         return self._updates.pending is not None
 
     @property
     def idle(self) -> bool:
-        """Whether its memory on the device may be taken."""
+        """True if its memory on the device may be taken."""
         return self._residency.loaded is not None and not self.ready
 
     @property

@@ -82,7 +82,7 @@ class Home:
 
     @property
     def waiting(self) -> bool:
-        """Whether nothing can be traced here before a lease comes back."""
+        """True if nothing can be traced here before a lease comes back."""
         ledger = self._ledger
         if ledger is None or not self.sharing:
             return False
@@ -226,7 +226,7 @@ class Home:
 
     @property
     def sharing(self) -> bool:
-        """Whether the block under way is shared."""
+        """True if the block under way is shared."""
         return self._picture is not None and self._picture.block.shared
 
     def _give(self) -> None:

@@ -64,13 +64,13 @@ class Ledger:
 
     @property
     def untouched(self) -> bool:
-        """Whether nobody but the home has anything of the current block."""
+        """True if nobody but the home has anything of the current block."""
         assert self.current is not None
         return self.current.free_rows == self._height
 
     @property
     def complete(self) -> bool:
-        """Whether all rows of the current block are done."""
+        """True if all rows of the current block are done."""
         return self.current is not None and self.current.done == self._height
 
     def window(self) -> int:
@@ -100,7 +100,7 @@ class Ledger:
 
     @property
     def available(self) -> bool:
-        """Whether a band of the current block is free."""
+        """True if a band of the current block is free."""
         return self.current is not None and bool(self.current.free)
 
     def lease(

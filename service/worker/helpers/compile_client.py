@@ -115,7 +115,7 @@ class CompileClient:
         return self._used.latest_first()
 
     def is_idle(self, priority: Priority) -> bool:
-        """Whether one of its processes has nothing to do."""
+        """True if one of its processes has nothing to do."""
         return not all(lane.wanted for lane in self._lanes[priority])
 
     def needs_no_wait(self, key: KernelKey) -> bool:
@@ -128,7 +128,7 @@ class CompileClient:
 
     @property
     def able(self) -> bool:
-        """Whether kernels are compiled by processes: there is a cache to compile into, and they can be started."""
+        """True if kernels are compiled by processes: there is a cache to compile into, and they can be started."""
         return self._able and time.monotonic() >= self._alone_until
 
     def queue(self, key: KernelKey, done: Done, client: str = "") -> bool:
@@ -293,7 +293,7 @@ def _nobody(milliseconds: float) -> None:
 
 
 def _has_cache() -> bool:
-    """Whether the environment leaves the driver's disk cache on; the helper finds out the rest."""
+    """True if the environment leaves the driver's disk cache on; the helper finds out the rest."""
     disabled = ("MESA_SHADER_CACHE_DISABLE", "MESA_GLSL_CACHE_DISABLE")
     if any(os.environ.get(name, "").lower() in DISABLED for name in disabled):
         return False

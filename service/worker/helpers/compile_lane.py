@@ -76,7 +76,7 @@ class Lane:
 
     @property
     def is_due(self) -> bool:
-        """Whether the next kernel can be begun."""
+        """True if the next kernel can be begun."""
         return self.key is None and bool(self.wanted) and not self.paused and time.monotonic() >= self.begins
 
     def pause(self, is_paused: bool) -> None:
@@ -156,7 +156,7 @@ class Lane:
         return self.wanted.pop(key)
 
     def is_late(self) -> bool:
-        """Whether the kernel takes too long. The time that its process waited for a processor does not count."""
+        """True if the kernel takes too long. The time that its process waited for a processor does not count."""
         if self.key is None or time.monotonic() < self.until:
             return False
         left_s = 0.0 if self.runnable is None else self.limit_s - self.runnable.elapsed_s

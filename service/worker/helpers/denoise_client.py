@@ -72,7 +72,7 @@ class DenoiseClient:
 
     @property
     def has_answered(self) -> bool:
-        """Whether its process is there and has loaded what it needs."""
+        """True if its process is there and has loaded what it needs."""
         return self._took_s > 0.0 and bool(self.ends)
 
     @property

@@ -21,7 +21,7 @@ class KernelWait:
         self._compiled_ms = 0.0
 
     def begin(self, key: KernelKey) -> bool:
-        """Whether that kernel is now being compiled. Raises CompileError where that has failed."""
+        """True if that kernel is now being compiled. Raises CompileError where that has failed."""
         self.compiling = False
         self.compiling = self.compiler is not None and self.compiler.queue(key, self._hear, self._client)
         return self.compiling

@@ -36,7 +36,7 @@ class Denoised:
 
 
 def is_for_the_eye(view: View) -> bool:
-    """Whether a picture is to be seen denoised, whatever is kept of it: numbers are what was rendered."""
+    """True if a picture is to be seen denoised, whatever is kept of it: numbers are what was rendered."""
     return view.denoise and view.aov == "color" and view.encoding != "linear"
 
 
@@ -80,7 +80,7 @@ class DenoisePolicy:
 
     @property
     def able(self) -> bool:
-        """Whether the picture is denoised for anybody."""
+        """True if the picture is denoised for anybody."""
         return (self.wanted or self.live) and self._why_not is None
 
     @property
@@ -89,21 +89,21 @@ class DenoisePolicy:
 
     @property
     def holds(self) -> bool:
-        """Whether tracing pauses, as the denoiser needs the processor."""
+        """True if tracing pauses, as the denoiser needs the processor."""
         return self.pending and self._yields and not self._denoiser.late
 
     @property
     def under_way(self) -> bool:
-        """Whether a denoised picture will be there soon."""
+        """True if a denoised picture will be there soon."""
         return (self.pending or not self._denoiser.busy) and not self._denoiser.late
 
     @property
     def quick(self) -> bool:
-        """Whether it takes so little that even a first look may wait for it: the denoiser has started."""
+        """True if it takes so little that even a first look may wait for it: the denoiser has started."""
         return self._denoiser.has_answered
 
     def covers(self, aov: str, noise: float | None, kept: bool = False) -> bool:
-        """Whether such a picture is shown denoised, or is where it is `kept`: not when it is clean, nor when nothing
+        """True if such a picture is shown denoised, or is where it is `kept`: not when it is clean, nor when nothing
         can denoise it."""
         if aov != "color" or not self.able or (kept and not self.wanted):
             return False

@@ -48,12 +48,12 @@ class FallbackPreview:
 
     @property
     def shows(self) -> bool:
-        """Whether there is something that it shows."""
+        """True if there is something that it shows."""
         return self._look.shows
 
     @property
     def due(self) -> bool:
-        """Whether there is more to trace."""
+        """True if there is more to trace."""
         return self._look.due
 
     def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
@@ -62,7 +62,7 @@ class FallbackPreview:
         return fallback.superset_keys(arrays, settings, self._superset)
 
     def can(self, wanted: KernelRequest) -> bool:
-        """Whether the update could be shown at once."""
+        """True if the update could be shown at once."""
         return serves(wanted) and self._compiled(wanted) is not None
 
     def _compiled(self, wanted: KernelRequest) -> KernelKey | None:

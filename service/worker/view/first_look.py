@@ -41,12 +41,12 @@ class _Content(NamedTuple):
 
 
 def is_large(settings: RenderSettings) -> bool:
-    """Whether a picture can be shown smaller than it is."""
+    """True if a picture can be shown smaller than it is."""
     return min(settings.width, settings.height) * LARGEST >= SMALLEST_SIDE
 
 
 def serves(wanted: KernelRequest) -> bool:
-    """Whether the update is worth a first look: its picture is large enough, and its scene no burden."""
+    """True if the update is worth a first look: its picture is large enough, and its scene no burden."""
     return is_large(wanted.settings) and scene_bytes(wanted.arrays) <= MOST_BYTES
 
 
@@ -87,12 +87,12 @@ class FirstLook:
 
     @property
     def shows(self) -> bool:
-        """Whether there is something that it shows."""
+        """True if there is something that it shows."""
         return self._ladder is not None
 
     @property
     def due(self) -> bool:
-        """Whether there is more to trace."""
+        """True if there is more to trace."""
         return self._ladder is not None and (self.scale != self._next or self._spent_s < ENOUGH_S)
 
     def begin(self, scene: Scene, settings: RenderSettings, generation: int) -> None:
@@ -176,7 +176,7 @@ class UnoptimisedLook:
         self._shown = (0, 0.0)
 
     def can(self, wanted: KernelRequest) -> bool:
-        """Whether the update could be shown before its kernel is there."""
+        """True if the update could be shown before its kernel is there."""
         able = self._client is not None and self._client.able
         return able and serves(wanted) and fallback.settings_for(wanted.settings) is not None
 

@@ -104,12 +104,12 @@ class FrameSource:
 
     @property
     def awaited(self) -> bool:
-        """Whether a client waits for something that takes steps."""
+        """True if a client waits for something that takes steps."""
         return self._guided is not None or bool(self._reads) or self._denoiser_answered or self._denoising_due
 
     @property
     def due(self) -> bool:
-        """Whether there is a step to be done."""
+        """True if there is a step to be done."""
         return self.awaited and not self._wait.compiling
 
     def step(self) -> bool:
@@ -158,7 +158,7 @@ class FrameSource:
         return self._prior.shown(self._residency.ladder, scale) if shows else None
 
     def _smooths(self, shown: float, prior: Prior | None) -> bool:
-        """Whether a picture of that scale may be shown denoised: a small one of the view's, where no guess at the
+        """True if a picture of that scale may be shown denoised: a small one of the view's, where no guess at the
         full one serves better. Reads are of the full one."""
         return shown == 1.0 or (self.denoising.live and prior is None and not self._denoised_reads)
 
@@ -175,7 +175,7 @@ class FrameSource:
         return None if samples < seen or stale else latest
 
     def _holds_frame(self, want: Want) -> bool:
-        """Whether the client has something to look at until the denoised picture comes, which can't be long; or waits
+        """True if the client has something to look at until the denoised picture comes, which can't be long; or waits
         for that alone, where it is there in a moment."""
         seen = self._served is not None and self._served.generation == self._tracker.generation
         waits = seen or (self.denoising.live and self.denoising.quick)
@@ -204,7 +204,7 @@ class FrameSource:
 
     @property
     def _denoising_due(self) -> bool:
-        """Whether somebody waits for the picture to be denoised, and it can be."""
+        """True if somebody waits for the picture to be denoised, and it can be."""
         denoising, scale = self.denoising, self.scale
         if self._residency.loaded is None or scale is None or not denoising.able:
             return False
@@ -248,7 +248,7 @@ class FrameSource:
         self._denoiser_answered = True
 
     def _waits(self, picture: Picture, coverage: bool = False) -> bool:
-        """Whether the kernel for the AOVs of the first hit is being compiled. Raises CompileError."""
+        """True if the kernel for the AOVs of the first hit is being compiled. Raises CompileError."""
         if self._wait.compiler is None or picture.guided_yet(coverage):
             return False
         scene, entry = picture.scene, kernel_keys.COVER if coverage else kernel_keys.GUIDES

@@ -65,7 +65,7 @@ class PriorGuess:
         return self.wanted and full.settings.width * full.settings.height <= MOST_PIXELS
 
     def lacks_depth(self, full: Picture) -> bool:
-        """Whether its depth is wanted, by which the picture can be seen from elsewhere, and was not traced."""
+        """True if its depth is wanted, by which the picture can be seen from elsewhere, and was not traced."""
         return not self.has_depth and self._fits(full) and can_move(full.scene.arrays.camera)
 
     def keep(self, ladder: ResolutionLadder, clean: np.ndarray | None) -> None:

@@ -182,7 +182,7 @@ class _Importer:
 
 
 def _is_dark(file: GltfDocument) -> bool:
-    """Whether an exporter of ours says that nothing surrounds the scene: then no default environment lights it."""
+    """True if an exporter of ours says that nothing surrounds the scene: then no default environment lights it."""
     if not file.count("scenes"):
         return False
     scene = file.item("scenes", file.root.value.get("scene", 0), "/scene")

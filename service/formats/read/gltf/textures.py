@@ -74,7 +74,7 @@ class Textures:
 
     @cached_property
     def _mixed(self) -> bool:
-        """Whether a sampler wraps u and v in different ways."""
+        """True if a sampler wraps u and v in different ways."""
         samplers = self.file.root.objects("samplers")
         return any(one.value.get("wrapS", 10497) != one.value.get("wrapT", 10497) for one in samplers)
 
@@ -185,7 +185,7 @@ class Textures:
 
 
 def _reach(chart: Chart, placing: dict[str, Any]) -> tuple[bool, bool]:
-    """Whether the texture is read beyond 0..1 in u, and in v, by coordinates of a box (v points down there)."""
+    """True if the texture is read beyond 0..1 in u, and in v, by coordinates of a box (v points down there)."""
     corners = np.stack(np.meshgrid(*zip(*chart, strict=True)), axis=-1).reshape(-1, 2).astype(np.float64)
     corners[:, 1] = 1 - corners[:, 1]
     turn = math.radians(placing.get("rotation", 0.0))

@@ -124,7 +124,7 @@ def images_in(tree: Tree) -> list[Tree]:
 
 
 def reads(tree: Tree, *operations: str) -> bool:
-    """Whether a tree has one of these operations outside of the coordinates of its images."""
+    """True if a tree has one of these operations outside of the coordinates of its images."""
     seen, left = set[int](), [tree]
     while left:
         one = left.pop()

@@ -9,7 +9,7 @@ DRIVE = re.compile(r"[A-Za-z]:")
 
 
 def is_absolute(reference: str) -> bool:
-    """Whether a path is absolute on Linux, Windows or a network, as on the machine where the file was made."""
+    """True if a path is absolute on Linux, Windows or a network, as on the machine where the file was made."""
     return reference.startswith(("/", "\\")) or DRIVE.match(reference) is not None
 
 

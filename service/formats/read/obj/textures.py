@@ -61,7 +61,7 @@ class Textures:
         return self._names[key]
 
     def holds(self, found: Map) -> bool:
-        """Whether the image of a map can be used; warns if not."""
+        """True if the image of a map can be used; warns if not."""
         return self._image(found)[1] is not None
 
     def channel(self, found: Map, default: str) -> str:
@@ -72,7 +72,7 @@ class Textures:
         return "r" if channel == "a" and not self._has_alpha(found) else channel
 
     def is_normal_map(self, found: Map) -> bool:
-        """Whether the image of `bump` contains normals, as Blender writes them, instead of heights."""
+        """True if the image of `bump` contains normals, as Blender writes them, instead of heights."""
         from PIL import Image
 
         image = self._image(found)[1]

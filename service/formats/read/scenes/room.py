@@ -85,7 +85,7 @@ def _sums(one: Placed) -> tuple[float, Doubles]:
 
 
 def _is_room(scene: Scene, two_sided: dict[str, bool], bounds: Bounds, enclosed: float) -> bool:
-    """Whether rays from each side of the box meet the backs of walls first. Two-sided walls count only where there is
+    """True if rays from each side of the box meet the backs of walls first. Two-sided walls count only where there is
     something inside: an empty body that faces inwards is rather a solid turned inside out."""
     low, high = bounds
     extent, backs, more, rays = high - low, list[Hit](), 0, 0
@@ -112,7 +112,7 @@ def _is_room(scene: Scene, two_sided: dict[str, bool], bounds: Bounds, enclosed:
 
 
 def _crosses_more(scene: Scene, origin: Doubles, direction: Doubles, first: Hit) -> bool:
-    """Whether a ray through the box meets more than two surfaces."""
+    """True if a ray through the box meets more than two surfaces."""
     hit: Hit | None = first
     for _ in range(2):
         assert hit is not None

@@ -31,7 +31,7 @@ class Node:
         return f"{self.pointer}.inputs:{name}"
 
     def has(self, name: str) -> bool:
-        """Whether the file says anything about an input."""
+        """True if the file says anything about an input."""
         found = self.shader.GetInput(name)
         return bool(found) and (found.GetAttr().HasAuthoredValue() or found.HasConnectedSource())
 

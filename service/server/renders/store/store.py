@@ -66,7 +66,7 @@ class RenderStore:
         self.failures = 0  # of writes, which had to do without
 
     def usable(self) -> bool:
-        """Whether the data folder can be written to; a disk that is full may have room later."""
+        """True if the data folder can be written to; a disk that is full may have room later."""
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=self._folder).close()
