@@ -29,7 +29,7 @@ import sys
 import numpy as np
 
 from gpu import Renderer, RenderSettings, software_device
-from service import presets
+from service.document import presets
 from service.bench.scenes import BenchAssets
 from service.pack import pack
 from service.document import parse_scene
