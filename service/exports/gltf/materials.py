@@ -16,7 +16,7 @@ from service.exports.gltf.material_writer import Asked, MaterialWriter
 from service.exports.gltf.textures import Plane, Textures
 from service.exports.losses import Losses
 from service.exports.principled import as_principled
-from service.formats.surface import gltf
+from service.formats.surface import outputs
 from service.formats.surface.outputs import Output
 from service.problems import escaped
 
@@ -98,7 +98,7 @@ def _transmits(material: AnySurface) -> bool:
 class _Principled(MaterialWriter):
     def written(self) -> Tree:
         weight = getattr(self.given, FILM_WEIGHT, 1.0)
-        inputs = gltf.written(self.material, self.tell, self.asked.thickness, Output(weight, FILM_WEIGHT))
+        inputs = outputs.gltf_pbr(self.material, self.tell, self.asked.thickness, Output(weight, FILM_WEIGHT))
         made = self.base(inputs["base_color"].value, "base_color")
         found = extensions.written(self, inputs) | self._emission(made)
         rough, metallic = (
@@ -115,7 +115,7 @@ class _Principled(MaterialWriter):
             made["normalTexture"] = normal
         if found:
             made["extensions"] = found
-        self.tell_others(gltf.WRITTEN | {"emission_sides"})
+        self.tell_others(outputs.GLTF_PBR | {"emission_sides"})
         return made
 
     def _beside(self, mine: tuple[float, Plane | None], other: tuple[float, Plane | None]) -> Plane | None:

@@ -11,7 +11,7 @@ from service.exports.losses import Losses
 from service.exports.materialx.graph import Graph, Images, Value, switch, valid
 from service.exports.principled import as_principled
 from service.exports.writing import Exported, Files, Limits, check_size
-from service.formats.surface import MODELS, open_pbr, standard
+from service.formats.surface import MODELS, outputs
 from service.formats.surface.outputs import Output, is_used
 from service.formats.surface.plain import Default
 from service.problems import escaped
@@ -47,10 +47,10 @@ def _written(scene: Scene, name: str, own: str, images: Images, losses: Losses) 
     pointer = f"/materials/{escaped(name)}"
     material, graph = scene.materials[name], Graph(images, pointer, losses)
     if isinstance(material, OpenpbrMaterial):
-        model, inputs = "open_pbr_surface", open_pbr.written(material)
+        model, inputs = "open_pbr_surface", outputs.open_pbr_surface(material)
     else:
         material = as_principled(material, pointer, losses)
-        model, inputs = "standard_surface", standard.written(material, graph.tell)
+        model, inputs = "standard_surface", outputs.standard_surface(material, graph.tell)
     if is_used(material.emission) and material.emission_sides == "both":
         graph.tell("emission_sides", "the file does not say on which sides a surface shines")
     if material.height is not None:

@@ -1,7 +1,7 @@
 """One vocabulary of materials: what the inputs of the surface models that files have mean. The names are MaterialX'.
 
-A reader of a format gives `Inputs`, its syntax, and a writer takes `Outputs`; a model's file says once for each
-direction what they are as a material of the document.
+A reader of a format gives `Inputs`, its syntax, and a model's file says once what they are as a material of the
+document; `outputs` says it the other way round, and the writer of a format takes that.
 
 standard      Autodesk Standard Surface
 open_pbr      OpenPBR Surface
@@ -13,7 +13,7 @@ parts         what several of them have in common
 gltf_members  where a glTF file says the inputs of its model
 inputs        what a model reads a shader by, and the parameters that it sets
 plain         inputs that are numbers, colours and textures
-outputs       what a model's writer gives
+outputs       materials of the document as inputs of a model
 trees         formulas that hold for numbers and for textures
 """
 

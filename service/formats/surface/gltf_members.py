@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from service.document.numbers import LARGEST
 from service.formats.surface.inputs import LEAST_LENGTH
+from service.formats.types import LARGEST
 
 ROUGH, GLOSSY = "pbrMetallicRoughness", "pbrSpecularGlossiness"
 

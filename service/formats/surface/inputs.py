@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from service.document.numbers import BRIGHTEST, LARGEST
 from service.formats.surface.trees import Tree, Unsupported
+from service.formats.types import BRIGHTEST, LARGEST
 
 LEAST_LENGTH = 1e-9  # metres
 # Ranges of parameters that are no shares.

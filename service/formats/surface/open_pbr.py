@@ -1,13 +1,11 @@
-"""`open_pbr_surface` as `openpbr` and back [OpenPBR Surface 1.1.1]: the parameters have the same names."""
+"""`open_pbr_surface` as `openpbr` [OpenPBR Surface 1.1.1]: the parameters have the same names."""
 
 from __future__ import annotations
 
-from service.document.material import OpenpbrMaterial
-from service.document.numbers import LARGEST
 from service.formats.surface.inputs import RANGES, Inputs, Triple
-from service.formats.surface.outputs import Output, Outputs
 from service.formats.surface.plain import Default
 from service.formats.surface.trees import constant, times
+from service.formats.types import LARGEST
 
 WHITE: Triple = (1.0, 1.0, 1.0)
 BLACK: Triple = (0.0, 0.0, 0.0)
@@ -54,12 +52,6 @@ def open_pbr_surface(s: Inputs) -> None:
     if s.is_used("transmission_dispersion_scale", 0):
         scale, abbe = s.number("transmission_dispersion_scale", 0), "transmission_dispersion_abbe_number"
         disperse(s, scale, s.number(abbe, 20))
-
-
-def written(m: OpenpbrMaterial) -> Outputs:
-    """What the document says."""
-    said = {name: getattr(m, name) for name in DEFAULTS if name in m.model_fields_set}
-    return {name: Output(value, name) for name, value in said.items() if value is not None}
 
 
 def first(name: str) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from service.document.numbers import LARGEST
 from service.formats.surface.inputs import Inputs
 from service.formats.surface.trees import (
     Tree,
@@ -17,6 +16,7 @@ from service.formats.surface.trees import (
     raised,
     times,
 )
+from service.formats.types import LARGEST
 
 HALF = 0.5  # a film that covers so much is nearer to a whole one than to none
 COAT_F0 = 0.04  # reflectance head-on of principled's coat, whose index is 1.5

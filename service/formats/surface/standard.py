@@ -1,13 +1,11 @@
-"""`standard_surface` [Autodesk Standard Surface 1.0.1] as `principled` and back, or as `openpbr` where it loses less.
+"""`standard_surface` [Autodesk Standard Surface 1.0.1] as `principled`, or as `openpbr` where it loses less.
 docs/files.md has the same tables in words."""
 
 from __future__ import annotations
 
-from service.document.material import PrincipledMaterial
-from service.formats.surface import open_pbr, outputs, parts
+from service.formats.surface import open_pbr, parts
 from service.formats.surface.inputs import TANGENT, Inputs, Triple
 from service.formats.surface.open_pbr import BLACK, NITS, RADIUS_SCALE, WHITE
-from service.formats.surface.outputs import Output, Outputs, Tell, is_used, scaled
 from service.formats.surface.plain import Default
 from service.formats.surface.trees import (
     Tree,
@@ -227,79 +225,3 @@ def _stretched(s: Inputs, roughness: str, anisotropy: str, rotation: str, tangen
         s.put(f"{roughness}_anisotropy", anisotropy, complement(across), 0.0, s.tree(anisotropy))
         s.tangent(tangent, "tangent", s.number(rotation, 0.0) * 360)
     s.put(roughness, roughness, tree, open_pbr.first(roughness), s.tree(roughness))
-
-
-def written(m: PrincipledMaterial, tell: Tell) -> Outputs:
-    base = Output(m.base_color, "base_color")
-    made: Outputs = {"base": Output(1.0, "base_color"), "base_color": base}
-    if is_used(m.metallic):
-        made["metalness"] = Output(m.metallic, "metallic")
-    if m.metallic != 1:
-        made |= _dielectric(m, tell)
-    if is_used(m.transmission):
-        made |= _transmission(m, tell)
-    if m.is_thin:
-        made["thin_walled"] = Output(True, "thin_walled")
-    if is_used(m.diffuse_transmission):  # what the model scatters below a thin wall leaves on the other side
-        made["subsurface"] = Output(m.diffuse_transmission, "diffuse_transmission")
-        through = Output(m.diffuse_transmission_color, "diffuse_transmission_color")
-        made["subsurface_color"] = base if through.value is None else through
-    if is_used(m.subsurface) and m.subsurface_radius is not None and not m.is_thin:
-        made["subsurface"] = Output(m.subsurface, "subsurface")
-        made |= {"subsurface_color": base, "subsurface_radius": Output(m.subsurface_radius, "subsurface_radius")}
-    elif is_used(m.subsurface):
-        tell("subsurface", "a flatter diffuse reflection is not written")
-    made["specular_roughness"] = Output(m.roughness, "roughness")
-    if is_used(m.anisotropic):
-        made["specular_anisotropy"] = Output(scaled(m.anisotropic, parts.STRETCH), "anisotropic")
-        if outputs.plain(m.anisotropic_rotation):
-            made["specular_rotation"] = Output(scaled(m.anisotropic_rotation, 1 / 360), "anisotropic_rotation")
-    if is_used(m.sheen):
-        made["sheen"], made["sheen_roughness"] = (
-            Output(m.sheen, "sheen"),
-            Output(m.sheen_roughness, "sheen_roughness"),
-        )
-        made["sheen_color"] = Output(outputs.sheen_color(m, tell), "sheen_color")
-    if is_used(m.clearcoat):
-        made["coat"], made["coat_roughness"] = Output(m.clearcoat, "clearcoat"), outputs.coat_roughness(m, tell)
-        if m.clearcoat_normal_map is not None:
-            made["coat_normal"] = Output(m.clearcoat_normal_map, "clearcoat_normal_map")
-    if is_used(m.film_thickness):
-        made["thin_film_thickness"] = Output(m.film_thickness, "film_thickness")
-        made["thin_film_IOR"] = Output(m.film_ior, "film_ior")
-    if is_used(m.emission):
-        made |= {"emission": Output(1.0, "emission"), "emission_color": Output(m.emission, "emission")}
-    if m.alpha != 1:
-        made["opacity"] = Output(m.alpha, "alpha")
-    if m.normal_map is not None:
-        made["normal"] = Output(m.normal_map, "normal_map")
-    if m.alpha_cutoff is not None:
-        tell("alpha_cutoff", "the model has no cut-off; the opacity is written without it")
-    if m.conductor_eta is not None:
-        for name in ("conductor_eta", "conductor_k"):
-            tell(name, "the model has no index of metals; the base colour is written")
-    return made
-
-
-def _transmission(m: PrincipledMaterial, tell: Tell) -> Outputs:
-    made = {"transmission": Output(m.transmission, "transmission")}
-    if m.abbe is not None:
-        made["transmission_dispersion"] = Output(m.abbe, "abbe")
-    if m.attenuation_distance is None or m.is_thin:
-        return made | {"transmission_color": Output(m.base_color, "base_color")}
-    distance = outputs.number(m.attenuation_distance, "attenuation_distance", tell)
-    made["transmission_depth"] = Output(distance, "attenuation_distance")
-    if m.base_color != WHITE:
-        tell("base_color", "what it tints of the light that passes is not written beside an attenuation")
-    return made | {"transmission_color": Output(m.attenuation_color, "attenuation_color")}
-
-
-def _dielectric(m: PrincipledMaterial, tell: Tell) -> Outputs:
-    ior, weight = outputs.index(m)
-    made = {"specular_IOR": ior} | ({} if weight is None else {"specular": weight})
-    color = outputs.specular_color(m, tell)
-    if color != WHITE:
-        made["specular_color"] = Output(color, "specular_color")
-        if is_used(m.metallic):
-            tell("specular_color", "of what is a metal it tints the edges in the file")
-    return made

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
 
+from service.document import numbers
 from service.document.material import OpenpbrMaterial, PrincipledMaterial
 from service.document.material.principled import index_of_specular, roughness_of_gloss
 from service.document.texture import ColorTexture, NormalTexture, ScalarTexture
+from service.formats import types
 from service.formats.read.materialx.importer import read_materialx
-from service.formats.surface import MODELS, gltf, open_pbr, standard
+from service.formats.surface import MODELS, gltf, open_pbr, outputs
 from service.formats.surface.outputs import Outputs, plain
 from service.formats.surface.plain import Default, Given, PlainInputs
 from service.formats.types import AssetLimits
@@ -119,9 +123,18 @@ TEXTURES = {
     and name not in ("abbe", "subsurface_radius", "conductor_eta", "conductor_k")
 }
 WRITERS: dict[str, Callable[[PrincipledMaterial, Callable[[str, str], None]], Outputs]] = {
-    "standard_surface": standard.written,
-    "gltf_pbr": gltf.written,
+    "standard_surface": outputs.standard_surface,
+    "gltf_pbr": outputs.gltf_pbr,
 }
+
+
+def test_ranges_are_those_of_documents() -> None:
+    """Which readers say by themselves, as a process that parses needs no document."""
+    assert (types.LARGEST, types.BRIGHTEST) == (numbers.LARGEST, numbers.BRIGHTEST)
+    script = (
+        "import sys, service.formats.surface, service.formats.read.obj.importer; assert 'pydantic' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_the_table_is_whole() -> None:
@@ -142,16 +155,16 @@ def test_what_is_written_is_read_or_its_loss_is_told(model: str, table: Table) -
         read = Said(model, said)
         again = PrincipledMaterial.model_validate(read.material)
         if model == "gltf_pbr":
-            lost |= {each: "" for each in material.model_fields_set - gltf.WRITTEN}
+            lost |= {each: "" for each in material.model_fields_set - outputs.GLTF_PBR}
         before, after = meaning(material), meaning(again)
         differing = {each for each in before if before[each] != after[each]}
         assert not differing or name in lost or name in read.notes, (model, name, differing, before, after, said)
 
 
-def documents(outputs: Outputs) -> dict[str, Any]:
+def documents(written: Outputs) -> dict[str, Any]:
     """The values of a writer as files would bring them back."""
     found: dict[str, Any] = {}
-    for name, (value, _) in outputs.items():
+    for name, (value, _) in written.items():
         if isinstance(value, ScalarTexture | ColorTexture | NormalTexture):
             found[name] = value.model_dump(exclude_none=True)
             if isinstance(value, ColorTexture):
@@ -219,12 +232,12 @@ def test_openpbr_is_written_and_read_without_a_loss() -> None:
     textured = {name: COLOR if isinstance(open_pbr.DEFAULTS[name], tuple) else GREY for name in names}
     for values in (OPENPBR, OPENPBR | textured):
         material = OpenpbrMaterial.model_validate({"type": "openpbr", **values})
-        read = Said("open_pbr_surface", documents(open_pbr.written(material)))
+        read = Said("open_pbr_surface", documents(outputs.open_pbr_surface(material)))
         assert OpenpbrMaterial.model_validate(read.material) == material and not read.notes
     for name, value in {**OPENPBR, **textured}.items():
         beside = {"subsurface_weight": 1.0, "transmission_weight": 1.0, "transmission_dispersion_scale": 1.0}
         material = OpenpbrMaterial.model_validate({"type": "openpbr", **beside, name: value})
-        read = Said("open_pbr_surface", documents(open_pbr.written(material)))
+        read = Said("open_pbr_surface", documents(outputs.open_pbr_surface(material)))
         assert OpenpbrMaterial.model_validate(read.material) == material, name
 
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.formats.errors import ParseError
+from service.formats.types import BRIGHTEST, LARGEST
 from service.problems import escaped
 
 LARGEST_WHOLE = 1 << 53  # JSON's whole numbers are exact up to this one
 NUMBERS = {int, float}  # the types of numbers; bool is not among them
-LARGEST, BRIGHTEST = 1e9, 1e20  # the contract's ranges of lengths and of radiometric values
 
 
 class JsonView:

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from service.document.numbers import LARGEST
 from service.formats.read.gltf import anisotropy_texture, iridescence
 from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.surface.gltf import BLEND, DEFAULTS, MASK, OPAQUE
 from service.formats.surface.gltf_members import GLOSSY, ROUGH, ROWS, Row
 from service.formats.surface.plain import Default, Given, PlainInputs
+from service.formats.types import LARGEST
 
 MODES = {"OPAQUE": OPAQUE, "MASK": MASK, "BLEND": BLEND}
 BASE = {ROUGH: ("baseColorFactor", "baseColorTexture"), GLOSSY: ("diffuseFactor", "diffuseTexture")}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.document.numbers import BRIGHTEST
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.material_inputs import MaterialInputs
@@ -15,6 +14,7 @@ from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.surface import gltf
 from service.formats.surface.gltf_members import GLOSSY
+from service.formats.types import BRIGHTEST
 
 OTHER_HUES = (
     "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "

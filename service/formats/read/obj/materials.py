@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.document.numbers import BRIGHTEST
 from service.formats.read.obj.mtl import Map, MtlMaterial
 from service.formats.read.obj.textures import Textures
 from service.formats.read.scenes.names import unique
@@ -12,6 +11,7 @@ from service.formats.read.scenes.plain_mesh import GREY, NAME
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.surface import wavefront
 from service.formats.surface.plain import Default, Given, PlainInputs
+from service.formats.types import BRIGHTEST
 
 RELIEF = 0.01  # of the model's size
 MAPS = {name: f"map_{name}" for name in ("kd", "ks", "ke", "d", "pr", "pm", "ps", "pc", "pcr")}
