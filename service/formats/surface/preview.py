@@ -56,7 +56,7 @@ def _opacity(s: Inputs) -> None:
     is_glass = threshold == 0 and s.number("opacityMode", 0) != PRESENCE
     if is_glass and opacity is not None:
         s.put("transmission", "opacity", complement(s.tree("opacity")), 0.0)
-        if opacity[0] < 1:
+        if opacity[0] < 1 and s.material.get("metallic") != 1:
             clear = mixed(constant(1.0, 1.0, 1.0), s.tree("diffuseColor"), s.tree("opacity"))
             s.put("base_color", "diffuseColor", clear, instead=s.tree("diffuseColor"))
         return

@@ -316,8 +316,16 @@ def test_a_preview_that_reflects_much_is_a_metal() -> None:
     read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": [0.9, 0.8, 0.7]})
     assert read.material["metallic"] == 1 and read.material["base_color"] == [0.9, 0.8, 0.7]
     assert "without diffuseColor" in read.notes["specularColor"]
+    read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": [0.9, 0.8, 0.7], "opacity": 0.5})
+    assert read.material["base_color"] == [0.9, 0.8, 0.7]
     read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": [0.09, 0.045, 0.0]})
     assert read.material["ior"] == pytest.approx(1.3 / 0.7) and read.material["specular_color"] == [1, 0.5, 0]
     assert "metallic" not in read.material and not read.notes
     read = Said("UsdPreviewSurface", {"useSpecularWorkflow": 1.0, "specularColor": COLOR})
     assert "ior" not in read.material and "0.04" in read.notes["specularColor"]
+
+
+def test_the_index_of_a_coat_is_its_strength_on_principled() -> None:
+    """Which has one of 1.5; the sheen makes it that."""
+    read = Said("standard_surface", {"coat": 0.25, "coat_IOR": 2.0, "sheen": 1.0})
+    assert read.material["clearcoat"] == pytest.approx(0.25 * (1 / 9) / 0.04) and "coat_IOR" in read.notes
