@@ -1,4 +1,4 @@
-"""What the tools for agents answer with: structured results, one picture of at most a megapixel, and mistakes."""
+"""Answers of the tools for agents: structured results, one picture of at most a megapixel, and mistakes."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def refuse_files(document: Any, pointer: str) -> None:
 
 
 def _assets(value: Any, pointer: str) -> Iterator[tuple[str, Any]]:
-    """What stands under `asset` and in `assets`, and where. A material may have such a name, but is an object."""
+    """The entries of `asset` and `assets`, with their pointers. A material may have such a name, but is an object."""
     steps = enumerate(value) if isinstance(value, list) else value.items() if isinstance(value, dict) else ()
     for step, child in steps:
         where = f"{pointer}/{str(step).replace('~', '~0').replace('/', '~1')}"

@@ -104,8 +104,8 @@ def errors_as_results(tool: Callable[P, Awaitable[CallToolResult]]) -> Callable[
 
 
 def agent_server(url: str | None, key: str | None = None) -> MCPServer[None]:
-    """Of the Sunbox server at an address; `key` and address come from the environment where they are None. Raises
-    ValueError for what is no address."""
+    """The agents' server for the Sunbox server at an address; `key` and address come from the environment where they
+    are None. Raises ValueError for what is no address."""
     tools = AgentTools(Transport(url, key, TIMEOUT_S, PATIENCE_S))
 
     @asynccontextmanager

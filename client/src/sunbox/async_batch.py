@@ -64,7 +64,8 @@ class AsyncBatch:
         return await self._file("sheet", format=format, width=width, **view)
 
     async def animation(self, format: str = "apng", fps: float = 24, width: int | None = None, **view: Any) -> bytes:
-        """What there is, one after the other: apng, webp, gif, avif, or mp4 where the server has ffmpeg."""
+        """The pictures that there are, one after the other: apng, webp, gif, avif, or mp4 where the server has
+        ffmpeg."""
         return await self._file("animation", format=format, fps=fps, width=width, **view)
 
     async def zip(self, format: str = "png", **view: Any) -> bytes:

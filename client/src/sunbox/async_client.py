@@ -168,7 +168,8 @@ class AsyncClient:
         return dict(await self._transport.json("GET", f"/v1/assets/{await self.upload(path)}/scene?{query}"))
 
     async def describe(self, path: str | Path) -> dict[str, Any]:
-        """What a file is: kind, size, warnings; of a scene `variants` and `animations` (name, duration), too."""
+        """The description of a file: kind, size, warnings; of a scene `variants` and `animations` (name, duration),
+        too."""
         id = await self.upload(path)
         return dict(await self._transport.json("GET", f"/v1/assets/{id}", headers={"accept": "application/json"}))
 

@@ -72,7 +72,7 @@ class AsyncJob:
         return AsyncPicture(self._fetch, status)
 
     async def picture(self) -> AsyncPicture:
-        """What there is so far. Raises Refused (409) before the first sample, when its pixels are asked for."""
+        """The picture so far. Raises Refused (409) before the first sample, when its pixels are asked for."""
         return AsyncPicture(self._fetch, await self.status())
 
     async def cancel(self) -> None:

@@ -65,7 +65,7 @@ class AsyncStream:
 
     @property
     def generation(self) -> int:
-        """Of the last update, but for those that were refused."""
+        """The number of the last update, but for those that were refused."""
         return int(self._unseen[-1]["generation"]) if self._unseen else self._version.generation
 
     @property

@@ -24,7 +24,7 @@ class Background:
         self._lock = threading.Lock()
 
     def run(self, work: Coroutine[Any, Any, T]) -> T:
-        """What `work` returns or raises."""
+        """Returns or raises as `work` does."""
         future = asyncio.run_coroutine_threadsafe(work, self._started())
         try:
             return future.result()

@@ -122,7 +122,7 @@ class Client:
         return run(self._client.import_scene(path, variant, animation, time))
 
     def describe(self, path: str | Path) -> dict[str, Any]:
-        """What a file is; of a scene with its `variants` and `animations`."""
+        """The description of a file; of a scene with its `variants` and `animations`."""
         return run(self._client.describe(path))
 
     def export(self, scene: Any, format: str = "glb") -> Exported:
@@ -196,7 +196,7 @@ class Job:
         return Picture(run(self._job.result(progress)))
 
     def picture(self) -> Picture:
-        """What there is so far."""
+        """The picture so far."""
         return Picture(run(self._job.picture()))
 
     def cancel(self) -> None:
@@ -243,7 +243,7 @@ class Batch:
         return run(self._batch.sheet(format, width, **view))
 
     def animation(self, format: str = "apng", fps: float = 24, width: int | None = None, **view: Any) -> bytes:
-        """What there is, one after the other: apng, webp, gif, avif or mp4."""
+        """The pictures that there are, one after the other: apng, webp, gif, avif or mp4."""
         return run(self._batch.animation(format, fps, width, **view))
 
     def zip(self, format: str = "png", **view: Any) -> bytes:
@@ -289,7 +289,7 @@ class Picture:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What each knob became."""
+        """The resolved value of each knob."""
         return self._picture.settings
 
     @property
@@ -336,7 +336,7 @@ class Stream:
 
     @property
     def generation(self) -> int:
-        """Of the last update."""
+        """The number of the last update."""
         return self._stream.generation
 
     @property

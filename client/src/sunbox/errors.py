@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions with the server's own sentence."""
+"""Errors of a server or a connection, as exceptions with the server's own sentence."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Unreachable(SunboxError):
 
 
 def from_problem(problem: Any, status: int) -> SunboxError:
-    """Of an RFC 9457 document; of whatever a proxy answered, else."""
+    """The exception for an RFC 9457 document, or else for whatever a proxy answered."""
     kind = NotFound if status in (404, 410) else Refused if 400 <= status < 500 else Failed
     try:
         errors = [(str(each["pointer"]), str(each["detail"])) for each in problem.get("errors", ())]

@@ -52,7 +52,7 @@ class Frame:
 
 
 def parse(message: bytes) -> Frame:
-    """Of a binary message: the header's length, the header, the bytes of the image."""
+    """The frame in a binary message: the header's length, the header, the bytes of the image."""
     (length,) = _LENGTH.unpack_from(message)
     header = json.loads(message[_LENGTH.size : _LENGTH.size + length])
     known = {name: header.get(name) for name in Frame.__dataclass_fields__ if name != "data"}

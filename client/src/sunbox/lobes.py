@@ -1,4 +1,4 @@
-"""What a material's BSDF answers, as arrays."""
+"""Values of a material's BSDF, as arrays."""
 
 from __future__ import annotations
 

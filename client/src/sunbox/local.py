@@ -66,8 +66,8 @@ def _renderer() -> Any:
 
 @cache
 def _engine() -> Any:
-    """What the server's package offers: LocalRenderer, Interrupt, stop, ServiceError and as_problem. This package
-    knows that one by its entry point alone."""
+    """The server's package: LocalRenderer, Interrupt, stop, ServiceError and as_problem. This package knows that one
+    by its entry point alone."""
     cause = None
     for entry in entry_points(group=GROUP, name=NAME):
         try:

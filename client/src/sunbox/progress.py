@@ -14,7 +14,7 @@ class Line:
         self._bar: Any = None
 
     def show(self, status: dict[str, Any]) -> None:
-        """Of a render's status. Where no number of samples ends it the line counts."""
+        """Show a render's status. Where no number of samples ends it the line counts."""
         if not self._shown:
             return
         if self._bar is None:
@@ -26,7 +26,7 @@ class Line:
         self._bar.set_postfix_str(status["state"] if noise is None else f"{noise:.1%} noise")
 
     def show_batch(self, status: dict[str, Any]) -> None:
-        """Of a batch's status."""
+        """Show a batch's status."""
         if not self._shown:
             return
         if self._bar is None:

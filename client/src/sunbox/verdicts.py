@@ -1,4 +1,4 @@
-"""Whether two documents or pictures differ beyond noise."""
+"""Verdicts: do two documents or pictures differ beyond noise."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class View(anywidget.AnyWidget):
 
     @property
     def samples(self) -> int:
-        """Of the newest frame, per pixel."""
+        """Samples of the newest frame, per pixel."""
         return self._frame.samples
 
     @property
@@ -188,7 +188,7 @@ class View(anywidget.AnyWidget):
     # From here on all is called on the loop of the picture.
 
     async def _begun(self) -> dict[str, Any]:
-        """What the front end has to know."""
+        """The schema and the presets, which the front end has to know."""
         try:
             await self._live.begin()
             presets = {kind: await self._transport.json("GET", f"/v1/presets/{kind}") for kind in PRESETS}
