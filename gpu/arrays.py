@@ -56,7 +56,7 @@ class EnvironmentArrays:
 
 @dataclass(frozen=True)
 class TextureArrays:
-    """What the scene's textures are made of, and how its materials use them.
+    """The scene's textures as arrays, and how its materials use them.
 
     `slots`: the members of `layout.Material` that any material has textured (and "normal", "coat_normal"), with the
     slot that gives each its texel; those of `texture_records.OTHER_RANGES` have slots of their own, after all others.
@@ -165,7 +165,7 @@ class MovedArrays(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class SceneEdit:
-    """What an edit changes of a scene that is on the device; None leaves a part as it is."""
+    """An edit of a scene that is on the device; None leaves a part as it is."""
 
     camera: np.void | None = None  # layout.Camera
     materials: np.ndarray | None = None  # layout.Material, as many as before

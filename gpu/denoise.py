@@ -47,7 +47,7 @@ def missing() -> str | None:
 
 
 def on_processor(color: np.ndarray, albedo: np.ndarray | None, normal: np.ndarray | None, fine: bool) -> np.ndarray:
-    """What the library makes of (height, width, 3) float32. Raises RuntimeError where it fails."""
+    """The denoised picture, (height, width, 3) float32. Raises RuntimeError where the library fails."""
     import pyoidn
 
     smooth: np.ndarray = pyoidn.denoise(color, albedo, normal, hdr=True, quality="high" if fine else "fast")

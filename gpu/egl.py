@@ -26,7 +26,7 @@ Pointer = ctypes.c_void_p
 
 
 class EglError(Exception):
-    """What EGL refused."""
+    """EGL refused a call."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Device:
 
 
 class EglContext:
-    """What moderngl takes for a context: it is made current by `with`, and finds OpenGL's functions."""
+    """A context as moderngl takes it: it is made current by `with`, and finds OpenGL's functions."""
 
     def __init__(self, egl: ctypes.CDLL, opengl: ctypes.CDLL, device: int, version: int) -> None:
         """A core context of OpenGL `version` (430) on EGL's device of that number, which is current afterwards.
@@ -110,7 +110,7 @@ def devices(egl: ctypes.CDLL) -> list[Device]:
 
 
 class Questions:
-    """What EGL can be asked of a device."""
+    """The questions that EGL answers about a device."""
 
     def __init__(self, egl: ctypes.CDLL) -> None:
         address = egl.eglGetProcAddress

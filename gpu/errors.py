@@ -1,4 +1,4 @@
-"""What can go wrong on the GPU.
+"""Errors of the GPU.
 
 GpuError
     ContextError       no EGL context: says which package or driver is missing

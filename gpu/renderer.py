@@ -80,8 +80,8 @@ class Renderer:
         return Picture(self.context, self._kernels, self._uniform_buffer, scene, settings)
 
     def prior(self, color: np.ndarray, camera: np.void, depth: np.ndarray | None = None) -> Prior:
-        """What a picture shows, (height, width, 4) linear float32 as `Picture.read` gives it, as a prior for pictures
-        that edits of its scene lead to. With its `depth`, (height, width, 1), the camera may move.
+        """A picture, (height, width, 4) linear float32 as `Picture.read` gives it, as a prior for pictures that edits
+        of its scene lead to. With its `depth`, (height, width, 1), the camera may move.
 
         Raises OutOfMemory.
         """

@@ -1,4 +1,4 @@
-"""What a device's driver says of itself: its limits, the width of its subgroups, and its free memory."""
+"""A device by its driver's words: its limits, the width of its subgroups, and its free memory."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FREE_MEMORY = {"GL_NVX_gpu_memory_info": (0x9049, 1024), "GL_ATI_meminfo": (0x87
 
 
 def device_limits(device: int | None = None) -> dict[str, Any]:
-    """What `context.describe` has, and `glsl`, the version of the shading language; `limits` by OpenGL's names;
+    """The entries of `context.describe`, and `glsl`, the version of the shading language; `limits` by OpenGL's names;
     `subgroup_size` in invocations and `free_memory` in bytes, None where the driver does not say.
 
     Makes a context of its own. Raises ContextError.
@@ -62,7 +62,7 @@ def _of_extension(context: Any, names: dict[str, tuple[int, int]]) -> int | None
 
 
 def _integers(name: int) -> list[int]:
-    """What glGetIntegerv writes: at most four numbers of the names above."""
+    """The numbers that glGetIntegerv writes: at most four for the names above."""
     values = (ctypes.c_int * 4)()
     ctypes.CDLL(contexts.opengl_library()).glGetIntegerv(name, values)
     return list(values)

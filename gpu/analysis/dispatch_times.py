@@ -1,4 +1,4 @@
-"""What dispatches of chosen sizes take, without what chooses them: the floor and the slope of a device."""
+"""Times of dispatches of chosen sizes, without what chooses them: the floor and the slope of a device."""
 
 from __future__ import annotations
 

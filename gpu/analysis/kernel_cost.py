@@ -1,4 +1,4 @@
-"""What a scene's own kernel saves beside one with every common flag on: measured, on the scene itself."""
+"""The saving by a scene's own kernel beside one with every common flag on: measured, on the scene itself."""
 
 from __future__ import annotations
 

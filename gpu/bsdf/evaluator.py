@@ -62,7 +62,7 @@ class BsdfAlbedo:
 
 @dataclass(frozen=True)
 class BsdfTerms:
-    """Of n directions: `distribution` (n,), 1/sr, `geometry` (n,) and `fresnel` (n, 3), all float32. Where
+    """Terms for n directions: `distribution` (n,), 1/sr, `geometry` (n,) and `fresnel` (n, 3), all float32. Where
     `has_facets` (n,) is false the surface is a perfect mirror, which has only the last of them."""
 
     distribution: np.ndarray

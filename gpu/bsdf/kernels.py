@@ -1,4 +1,4 @@
-"""Which kernels evaluate a material: as few as possible, so that a slider seldom waits for the compiler.
+"""Kernels that evaluate a material: as few as possible, so that a slider seldom waits for the compiler.
 
 A material comes as a scene that holds it and nothing else.
 """
@@ -33,7 +33,7 @@ def bare(arrays: SceneArrays) -> SceneArrays:
 
 
 def defines(arrays: SceneArrays, raised: frozenset[str], entry: str) -> dict[str, object]:
-    """What the kernel `entry` is compiled with for a bare material; many materials have it in common.
+    """The defines of the kernel `entry` for a bare material; many materials have it in common.
 
     `bsdf_albedo.comp` takes the independent sampler, so that the scatter of its samples gives their error.
     """

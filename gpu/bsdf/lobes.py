@@ -1,4 +1,4 @@
-"""What a kernel needs defined to show one lobe of a material alone."""
+"""Defines by which a kernel shows one lobe of a material alone."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ EVERY = len(Lobe)  # stands for all lobes together
 
 
 def defines() -> dict[str, object]:
-    """What shaders/bsdf/lobe.glsl needs defined to let single lobes through."""
+    """The defines by which shaders/bsdf/lobe.glsl lets single lobes through."""
     numbers = {f"LOBE_{lobe.name}": f"{lobe.value}u" for lobe in Lobe}
     return {"LOBE_CHOICE": 1, "LOBE_EVERY": f"{EVERY}u", **numbers}

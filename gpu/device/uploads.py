@@ -1,5 +1,5 @@
-"""What several scenes read on the device, uploaded once: images, measurements, environments, tables of energy and of
-displays."""
+"""Data that several scenes read on the device, uploaded once: images, measurements, environments, tables of energy
+and of displays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fills shapes, as GLSL: records in a texture, that of what is outside first."""
+"""Media that fill shapes, as GLSL: records in a texture, that of what is outside first."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What paths of light begin with: the lights that they leave, and the targets that they are aimed at. The targets are
-balls around all shapes that may mirror or refract perfectly (shaders/lights/emission.glsl)."""
+"""Starts of paths of light: the lights that they leave, and the targets that they are aimed at. The targets are balls
+around all shapes that may mirror or refract perfectly (shaders/lights/emission.glsl)."""
 
 from __future__ import annotations
 

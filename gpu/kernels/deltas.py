@@ -1,4 +1,4 @@
-"""What materials do that is perfectly specular, by their own numbers; textures may add to it, or take some away."""
+"""Perfectly specular light of materials, by their own numbers; textures may add to it, or take some away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What kernels are compiled with: the flags of a scene, before and after edits, and the numbers of its records."""
+"""Defines that kernels are compiled with: the flags of a scene, before and after edits, and the numbers of its
+records."""
 
 from __future__ import annotations
 

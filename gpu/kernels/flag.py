@@ -1,4 +1,4 @@
-"""What is known of a flag: the scenes that need its code, and the sliders and menus that raise it."""
+"""The description of a flag: the scenes that need its code, and the sliders and menus that raise it."""
 
 from __future__ import annotations
 

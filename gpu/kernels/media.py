@@ -1,4 +1,4 @@
-"""What fills a scene's bodies, and the space around them."""
+"""Media that fill a scene's bodies, and the space around them."""
 
 from __future__ import annotations
 

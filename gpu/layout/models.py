@@ -32,7 +32,7 @@ class Lobe(IntEnum):
 
 @dataclass(frozen=True)
 class Model:
-    """What a model is and can do.
+    """A material model and its abilities.
 
     `name` is the document's `type`; `number` is that of `layout.Material.model`. `lobes` are those that it adds up.
     """
@@ -63,7 +63,7 @@ class Model:
 
     @property
     def lobe_names(self) -> tuple[str, ...]:
-        """What the model calls its lobes."""
+        """The model's names for its lobes."""
         words = dict(self.words)
         return tuple(words.get(lobe, lobe.name.lower()) for lobe in self.lobes)
 

@@ -1,4 +1,5 @@
-"""What a picture stores of every pixel on the device. A layer has a vector of 16 bytes, in a buffer of its own."""
+"""Layers that a picture stores of every pixel on the device. A layer has a vector of 16 bytes, in a buffer of its
+own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a declared record is: its members and their offsets, as a numpy dtype. `layout_glsl` writes it as GLSL."""
+"""A declared record: its members and their offsets, as a numpy dtype. `layout_glsl` writes it as GLSL."""
 
 from __future__ import annotations
 

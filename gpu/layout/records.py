@@ -206,7 +206,7 @@ class ShapeSpace(Record):
 
 
 class Body(Record):
-    """What fills a shape, besides what its material absorbs; the first one is what is outside of all."""
+    """The medium that fills a shape, besides what its material absorbs; the first one is what is outside of all."""
 
     extinction: vec3  # 1/m
     g: f32  # mean cosine of scattering

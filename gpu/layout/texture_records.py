@@ -51,7 +51,7 @@ TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
 
 
 class Texels(enum.Enum):
-    """What an image's numbers are."""
+    """The meaning of an image's numbers."""
 
     LINEAR = enum.auto()
     SRGB = enum.auto()  # bytes whose colours are decoded; alpha is linear

@@ -137,11 +137,11 @@ class LightPaths:
 
     @property
     def _scale(self) -> float:
-        """What a pixel's sums are times in the mean; they are 0 before there is a path."""
+        """The factor from a pixel's sums to their mean; the sums are 0 before there is a path."""
         return self._unit * self._pixels / max(self.even + self.odd, 1)
 
     def radiance(self, first: int, count: int) -> np.ndarray:
-        """What they bring to pixels [first, first + count) in the mean: (count, 3) float32."""
+        """Mean radiance that they bring to pixels [first, first + count): (count, 3) float32."""
         if not self.on:
             return np.zeros((count, 3), np.float32)
         return (self._numbers(first, count)[:, :3] * self._scale).astype(np.float32)

@@ -50,7 +50,7 @@ class Look:
 
     @property
     def defines(self) -> dict[str, object]:
-        """What resolve.comp is compiled for."""
+        """The defines that resolve.comp is compiled with."""
         table = isinstance(self.tone_map, ViewTable)
         curve = "linear" if table else self.tone_map
         gamut = 0 if table or not self.p3 else THEN_P3 if self.tone_map in FITTED else IN_P3

@@ -1,4 +1,4 @@
-"""What a picture showed before an edit, as a guess at what it shows afterwards, until that has samples of its own.
+"""A picture from before an edit, as a guess at what it shows afterwards, until that has samples of its own.
 
 A guess is for the eye alone: it is biased, and enters no accumulator. Two small pictures of few samples, before and
 after the edit, say what the edit changes: both follow the same random numbers, so that they are equal where it

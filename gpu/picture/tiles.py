@@ -89,7 +89,8 @@ class Tiles:
         return column, row, min(columns, self._most_columns, width - column), rows
 
     def _large_tile(self, row: int, samples: int) -> Tile:
-        """Of the rows from there on: all of them where they fit into a slice, else an equal share of their cost."""
+        """A tile of the rows from there on: all of them where they fit into a slice, else an equal share of their
+        cost."""
         width, height = self.size
         bands = self.rates[row // self._band :]
         costs = np.where(bands > 0, bands, self.cost_s or GUESS_S * self._caution) * (self._band * width * samples)

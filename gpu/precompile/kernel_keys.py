@@ -1,4 +1,4 @@
-"""Which kernels a scene needs, as keys: everything that the machine code depends on, but for the driver."""
+"""Keys of the kernels that a scene needs: everything that the machine code depends on, but for the driver."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a thin film reflects, as a table that all materials share: light that goes to and fro in it interferes.
+"""Reflectance of a thin film, as a table that all materials share: light that goes to and fro in it interferes.
 
 Airy's series for the exact interfaces [Born & Wolf 1999, section 7.6] knows the materials by zeta alone, the product
 of the two interfaces' amplitudes. Its m-th term has zeta^m W(m x) for a path difference x, where W is the integral of

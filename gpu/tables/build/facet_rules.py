@@ -1,4 +1,4 @@
-"""Which facets reflect light from a direction, as a few cosines and weights, for `energy.Tables.facets`.
+"""Facets that reflect light from a direction, as a few cosines and weights, for `energy.Tables.facets`.
 
 By these the albedo of any reflectance that depends on the cosine at the facet is a sum of a few values of it: Gauss's
 rule for the density of that cosine, of four cosines, which is exact for polynomials of degree 7.
