@@ -1,4 +1,4 @@
-"""What a scene means: documents, files, renders, routes and the command line. No GL call is made outside of `worker`.
+"""The service: documents, files, renders, routes and the command line. No GL call is made outside of `worker`.
 
 From the ground up, each knows those above it in this list.
 

@@ -1,4 +1,4 @@
-"""What an operator says of callbacks: to which hosts they go, which addresses these may have, and what signs them."""
+"""An operator's rules for callbacks: to which hosts they go, which addresses these may have, and what signs them."""
 
 from __future__ import annotations
 

@@ -361,7 +361,7 @@ def cores() -> int:
 
 
 def _variables() -> dict[str, str]:
-    """What the environment sets, by the names of fields: as pydantic-settings has it, which takes 60 ms to load."""
+    """The environment's settings by the names of fields: pydantic-settings reads them so, but takes 60 ms to load."""
     given = {name.upper(): value for name, value in os.environ.items()}
     return {name.removeprefix(PREFIX).lower(): given[name] for name in given if name.startswith(PREFIX)}
 

@@ -1,4 +1,4 @@
-"""Whether this process is in a container, where processors are shared by other rules than priorities."""
+"""Tells if this process is in a container, where processors are shared by other rules than priorities."""
 
 from __future__ import annotations
 

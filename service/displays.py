@@ -22,8 +22,7 @@ _PLAIN = ("Un-tone-mapped", "Video (colorimetric)", "Raw")
 
 @dataclass(frozen=True)
 class Encoding:
-    """What the numbers of a picture stand for. `transfer`: "srgb", "pq" (SMPTE ST 2084), or the exponent of a power
-    law."""
+    """The meaning of a picture's numbers. `transfer`: "srgb", "pq" (SMPTE ST 2084), or a power law's exponent."""
 
     primaries: Primaries = "rec709"
     transfer: Literal["srgb", "pq"] | float = "srgb"
@@ -66,7 +65,7 @@ def view_of(tone_map: str, p3: bool = False) -> tuple[str, str] | None:
 
 
 def mistake(tone_map: str) -> str | None:
-    """What is wrong with a tone map that names a display and a view; None: nothing."""
+    """The mistake in a tone map that names a display and a view; None: there is none."""
     display, _, view = tone_map.removeprefix(PREFIX).partition("/")
     if display not in DISPLAYS:
         known = ", ".join(map(repr, DISPLAYS))
@@ -77,7 +76,7 @@ def mistake(tone_map: str) -> str | None:
 
 
 def encoding_of(tone_map: str, p3: bool = False) -> Encoding:
-    """What the numbers of a picture under this tone map stand for."""
+    """The encoding of a picture's numbers under this tone map."""
     found = view_of(tone_map, p3)
     if found is None:
         return DISPLAY_P3 if p3 else SRGB

@@ -61,7 +61,7 @@ class InvalidDocument(ServiceError):
 
 
 class AssetError(ServiceError):
-    """An asset that is missing, unreadable or not what its use asks for; whoever knows the field adds the pointer.
+    """An asset that is missing, unreadable or not what its use asks for; callers that know the field add the pointer.
 
     `place` is a pointer into the asset's own JSON, where it has one.
     """

@@ -1,5 +1,5 @@
-"""What a person at the editor waits for, measured at the socket of a real server: start-up, and moves of a slider or
-the camera.
+"""Waits of a person at the editor, measured at the socket of a real server: start-up, and moves of a slider or the
+camera.
 """
 
 from __future__ import annotations

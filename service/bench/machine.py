@@ -1,4 +1,4 @@
-"""What was measured on: without it a figure means nothing."""
+"""The machine that was measured: without it a figure means nothing."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def _authority(host: str) -> str:
 
 
 def lines_of(error: SunboxError) -> list[str]:
-    """What is wrong, a line for each field."""
+    """The mistakes, a line for each field."""
     title = f"{error.title}: " if error.title else ""
     return [f"{pointer or '/'}: {detail}" for pointer, detail in error.errors] or [f"{title}{error.detail}"]
 

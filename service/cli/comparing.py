@@ -1,4 +1,5 @@
-"""What the commands compare: scenes, pictures with their layers, renders on a server; and what they say of it."""
+"""Sources that the commands compare: scenes, pictures with their layers, renders on a server; and the words for
+results."""
 
 from __future__ import annotations
 

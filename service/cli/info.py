@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
-    """What the scene is made of, a row for each kind of thing."""
+    """The scene's contents, a row for each kind of thing."""
     rows = [
         ("shapes", _counted(shape.type for shape in scene.shapes)),
         ("triangles", _triangles(packed)),
@@ -74,7 +74,8 @@ def kernel(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]
 
 
 def measured(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]:
-    """What the scene's kernel saves beside the one for many scenes; both are compiled, and measured here and now."""
+    """Rows on what the scene's kernel saves beside the one for many scenes; both are compiled, and measured here and
+    now."""
     print("compiling and measuring; the kernel for many scenes may take minutes", file=sys.stderr)
     price = renderer.kernel_cost(packed.arrays)
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))

@@ -24,7 +24,7 @@ LOAD_THEMSELVES = ("render", "serve")  # commands that load most modules while t
 
 
 def program() -> int:
-    """What `sunbox` runs as a process of its own: the exit code.
+    """The entry point of `sunbox` as a process of its own; returns the exit code.
 
     The process ends as soon as its threads have ended and all that was registered for its end has run: to free every
     object first, as Python does, takes 0.1 s, a seventh of a small render.

@@ -45,7 +45,7 @@ class Output:
     names: dict[str, list[str]] | None = None  # of shapes and materials, for Cryptomatte
 
     def matte(self, tracing: Tracing) -> Cryptomatte | None:
-        """What shapes and materials cover of each pixel, where that was asked for."""
+        """Coverage of each pixel by shapes and materials; None where it was not asked for."""
         from service.formats.images.cryptomatte import LAYERS, Cryptomatte
         from service.ipc.messages import View
 

@@ -108,7 +108,7 @@ def _fetch(client: Client, arguments: argparse.Namespace) -> int:
 
 
 def _cancel(client: Client, arguments: argparse.Namespace) -> int:
-    """Of one that has ended DELETE would delete the picture."""
+    """Cancel a render, unless it has ended: DELETE would delete its picture."""
     job = client.job(arguments.id)
     if (state := job.status()["state"]) in ENDED:
         print(f"it is {state} already; `sunbox renders delete` deletes it", file=sys.stderr)

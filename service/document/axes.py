@@ -50,7 +50,8 @@ class Values(Model):
         return {**document, "scene": scene}
 
     def written(self, step: int) -> Any:
-        """What a step writes into a scene, by itself; entries of lists are members here, named by their indices."""
+        """A step's value in the part of a scene that it changes; entries of lists are members here, named by their
+        indices."""
         value = self.values[step]
         for name in reversed(_steps(self.path)):
             value = {name: value}
@@ -210,7 +211,7 @@ class Variations:
         return math.prod(map(len, self.axes))
 
     def steps(self, number: int) -> tuple[int, ...]:
-        """What step each axis is at; the last runs fastest."""
+        """The step of each axis; the last axis runs fastest."""
         found = []
         for axis in reversed(self.axes):
             number, step = divmod(number, len(axis))
@@ -222,11 +223,11 @@ class Variations:
         return self._at(self.steps(number))
 
     def name(self, number: int) -> str:
-        """What tells this render from the others, for a person."""
+        """A name that tells this render from the others, for a person."""
         return ", ".join(axis.name(step) for axis, step in zip(self.axes, self.steps(number), strict=True))
 
     def labels(self, number: int) -> list[str]:
-        """Of each axis the step's, without what it is of."""
+        """The label of each axis' step, without what the axis varies."""
         return [axis.label(step) for axis, step in zip(self.axes, self.steps(number), strict=True)]
 
     def one_by_one(self) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -1,4 +1,4 @@
-"""What every model of the document shares: strictness, how a validator reports an error, and the names that people
+"""The base of every model of the document: strictness, how a validator reports an error, and the names that people
 give to shapes and lights.
 """
 

@@ -27,7 +27,7 @@ def _among() -> str:
 
 
 def shown_as(tone_map: str, color_space: ColorSpace, format: str = "png") -> displays.Encoding:
-    """What the numbers of a file stand for. Raises InvalidDocument where its format cannot say so."""
+    """The meaning of a file's numbers. Raises InvalidDocument where its format cannot state it."""
     p3 = color_space == "display_p3"
     encoding = displays.encoding_of(tone_map, p3)
     if p3 and encoding != displays.DISPLAY_P3:

@@ -1,4 +1,4 @@
-"""What fills a closed shape, or all space outside of bodies: absorption, scattering and emission along the way."""
+"""Media that fill closed shapes, or all space outside of bodies: absorption, scattering, emission along the way."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def single_scattering_albedo(color: float, g: float) -> float:
 
 @cache
 def _half_space() -> tuple[np.ndarray, np.ndarray]:
-    """What half spaces show, and the albedos of single scattering that they have; both rise from 0 to 1."""
+    """Colours of half spaces, and the albedos of single scattering that give them; both rise from 0 to 1."""
     root = np.linspace(1.0, 0.0, STEPS)  # sqrt(1 - albedo), in which the colour is almost straight
     albedos = 1.0 - root**2
     return 1.0 - h_function(albedos, 1.0) * root, albedos

@@ -68,7 +68,7 @@ class ResolvedSettings:
         return sized | {name: getattr(self, name) for name in same}
 
     def document(self) -> dict[str, Any]:
-        """What each knob became, as JSON; null is "no such limit"."""
+        """The resolved value of each knob, as JSON; null is "no such limit"."""
         return asdict(self)
 
     def again(self, samples: int) -> dict[str, Any]:
@@ -123,8 +123,8 @@ def short(seconds: float) -> str:
 
 
 def forecast(samples: int, noise: float | None, elapsed_s: float) -> dict[str, Any] | None:
-    """Of each preset's number of samples the seconds from the start and the noise, for the scene at hand with its own
-    bounces, from what it has taken so far; None before that can be told. Noise is taken to fall with the root of the
+    """Seconds from the start and noise for each preset's number of samples: of the scene at hand with its own
+    bounces, from what it has taken so far; None before that is known. Noise is taken to fall with the root of the
     samples: what a low-discrepancy sampler gains beyond that comes on top."""
     if samples < TRUSTED_SAMPLES or noise is None or elapsed_s <= 0:
         return None

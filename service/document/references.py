@@ -29,7 +29,7 @@ def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
 
 
 def _members(value: Any) -> Iterable[tuple[Step, Any]]:
-    """Of an object or a list, whichever of them a document should have there."""
+    """The members of an object or the entries of a list, whichever a document should have there."""
     return value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
 
 

@@ -69,7 +69,7 @@ def model_schema(scene: Schema, model: str) -> Schema | None:
 
 
 def brief(schema: Schema) -> Schema:
-    """Of a model's schema: a line for each field with its range, unit and default."""
+    """A model's schema in short: a line for each field with its range, unit and default."""
     fields = {name: _field(each) for name, each in schema["properties"].items() if name != "type"}
     described = {"type": schema["properties"]["type"]["const"], "description": schema.get("description", "")}
     return described | {"required": [name for name in schema.get("required", ()) if name != "type"], "fields": fields}

@@ -30,7 +30,7 @@ def validated(adapter: TypeAdapter[T], document: Any, pointer: str) -> T:
 
 
 def both(first: Callable[[], T], second: Callable[[], U]) -> tuple[T, U]:
-    """What both return. Raises InvalidDocument with the mistakes of both."""
+    """The results of both. Raises InvalidDocument with the mistakes of both."""
     errors: list[FieldError] = []
     found: list[Any] = []
     for parse in (first, second):

@@ -1,4 +1,4 @@
-"""What a format has no place for: each loss with the field that it is about, in plain words."""
+"""Losses of an export: what a format has no place for, each with the field that it is about, in plain words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a writer is given and gives back."""
+"""Arguments and results of every writer."""
 
 from __future__ import annotations
 

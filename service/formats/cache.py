@@ -135,7 +135,7 @@ def as_lut(parsed: Parsed, name: str) -> LutData:
 
 
 def refused(name: str, error: ParseError) -> AssetError | NotProvided:
-    """What a caller is told of a file that is not read."""
+    """The error for a caller whose file is not read."""
     detail = f"{name}: {error}"
     return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
 

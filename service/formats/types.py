@@ -17,7 +17,7 @@ Kind = Literal["mesh", "image", "scene", "materials", "lut", "measured"]
 
 @dataclass(frozen=True)
 class MeshOddities:
-    """What is unusual about a mesh. Whether the picture shows it depends on the material."""
+    """Oddities of a mesh. The material decides if the picture shows them."""
 
     coinciding: int = 0  # triangles with the corners of an earlier one, whichever way they face
     differing: int = 0  # of these, those with other colours or texture coordinates
@@ -117,7 +117,7 @@ class MeasuredData:
 
 @dataclass(frozen=True)
 class RenderedPicture:
-    """What an EXR with the layer `variance` knows of the render that it was written from. The array is read-only."""
+    """A render as an EXR with the layer `variance` describes it. The array is read-only."""
 
     layers: Floats  # (height, width, 6), finite: colour and the variance of each channel's mean
     samples: int  # of each pixel

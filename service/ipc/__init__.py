@@ -1,4 +1,4 @@
-"""What the server and the renderer's process say to each other.
+"""Messages between the server and the renderer's process, and their transport.
 
 messages      the messages in both directions; immutable
 task_control  those by which a task stands still, goes on, ends or is saved

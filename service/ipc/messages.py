@@ -1,4 +1,4 @@
-"""What the server and the renderer's process say to each other. Immutable; arrays inside travel as shared memory."""
+"""Messages between the server and the renderer's process. Immutable; arrays inside travel as shared memory."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def driver_of(info: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Update:
-    """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
+    """A change of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
     `settings` are the arguments of gpu.RenderSettings."""
 
@@ -246,7 +246,7 @@ class Loaded:
 
     @property
     def kernel(self) -> dict[str, Any]:
-        """What a render's status says of its kernel."""
+        """The kernel's part of a render's status."""
         return {
             "raised": list(self.raised),
             "not_raised": list(self.spared),

@@ -1,4 +1,4 @@
-"""What is drawn of a scene: the materials that its shapes wear, and the textures that these read."""
+"""The parts of a scene that are drawn: the materials that its shapes wear, and the textures that these read."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class BsdfQuestions:
         self._slots = asyncio.Semaphore(LONG_AT_ONCE)
 
     async def ask(self, question: EvaluateBsdf, caller: str = "") -> dict[str, np.ndarray]:
-        """The arrays of its Evaluated; whoever asks may be cancelled. The renderers give the task its number.
+        """The arrays of its Evaluated; the asking task may be cancelled. The renderers give the task its number.
 
         Long questions of one caller are answered one after the other. Raises TooManyRequests or Unavailable where too
         many wait, Unavailable where nothing renders, and Internal where the renderer fails.

@@ -1,4 +1,4 @@
-"""What the server asks of its renderers, whether there is one supervised process or a pool of them."""
+"""The server's interface to its renderers, whether there is one supervised process or a pool of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ State = Literal["starting", "ready", "lost", "draining"]
 
 
 class Listener(Protocol):
-    """Who opened a task hears what becomes of it, on the event loop."""
+    """Receives the messages of the task that it opened, on the event loop."""
 
     def heard(self, message: FromRenderer) -> None: ...
 
@@ -27,7 +27,7 @@ class Listener(Protocol):
 
 @dataclass(frozen=True)
 class Place:
-    """Which renderer it is, and where it is."""
+    """A renderer's name, device and host."""
 
     id: str = "0"
     device: str = "0"  # as in SUNBOX_DEVICES
@@ -51,7 +51,7 @@ class Renderers(Protocol):
 
     @property
     def statistics(self) -> ClientStatistics:
-        """What clients were given, to be counted by whoever gives it to them."""
+        """Counters of frames and errors; the sender increments them."""
 
     @property
     def members(self) -> Sequence[Member]:

@@ -128,7 +128,8 @@ class ReplayLog:
         return self._done(message) if isinstance(message, Done) else message
 
     def scenes(self) -> list[Encoded | ToRenderer]:
-        """What gives another renderer the same scenes, in order; the encoded ones are whoever's sends them."""
+        """Messages that give another renderer the same scenes, in order; the caller owns the descriptors of encoded
+        ones."""
         out: list[Encoded | ToRenderer] = []
         for number, (_, state) in enumerate(self._states.items()):
             if number:  # joined with the one before, that would be lost with it
@@ -139,7 +140,7 @@ class ReplayLog:
         return out
 
     def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
-        """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
+        """Messages for a new renderer, in order; the caller owns the descriptors of encoded ones. `kept`: encoded."""
         out = self.scenes()
         if kept is not None:
             out.append(kept)

@@ -40,7 +40,7 @@ class Distribution:
 
 @dataclass
 class ClientStatistics:
-    """What clients were given, whichever renderer it came from."""
+    """Counters of frames and errors, whichever renderer they came from."""
 
     first_frame_s: Distribution = field(default_factory=Distribution)  # from an update to its first frame
     frames: int = 0
@@ -50,7 +50,7 @@ class ClientStatistics:
 
 @dataclass(frozen=True)
 class Held:
-    """What the renderer has now."""
+    """The renderer's tasks and memory now."""
 
     tasks: int = 0
     bytes: int = 0  # of theirs, on the device

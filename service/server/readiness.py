@@ -1,5 +1,6 @@
-"""What an earlier server left is taken up while this one answers health already; whether a picture can be rendered
-now; and the first frame of a scene that no client asked for, by which readiness is known and a start is warmed up.
+"""Readiness: an earlier server's work is taken up while this one answers health already; whether a picture can be
+rendered now; and the first frame of a scene that no client asked for, by which readiness is known and a start is
+warmed up.
 """
 
 from __future__ import annotations

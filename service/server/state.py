@@ -146,7 +146,7 @@ class AppState:
         return self._job(order, document, packed, outcome)
 
     def _ended_work(self, kind: CallbackKind, id: str, owner: str) -> Render | Batch:
-        """Whose end a callback is about. Raises NotFound, Gone."""
+        """The render or batch that a callback is about. Raises NotFound, Gone."""
         return self.batches.get(id, owner) if kind == "batch" else self.render_queue.get(id, owner)
 
     def _resumed(self, stored: StoredRender) -> Render:
@@ -167,7 +167,7 @@ class AppState:
         return await packing(partial(self.reader.pack, scene, owner=owner, hold=count))
 
     def _resting_bytes(self) -> int:
-        """What renderers on processors keep for a moment in this machine's memory."""
+        """Bytes of this machine's memory that renderers on processors keep for a moment."""
         if self.config.ray is not None:  # theirs are other machines
             return 0
         return sum(member.statistics.held.resting_bytes for member in self.renderers.members)

@@ -1,4 +1,4 @@
-"""Work that nobody awaits: what kills it is logged and counted, and whoever it worked for is told. And waiting for an
+"""Work that nobody awaits: its errors are logged and counted, and a callback learns of them. And waiting for an
 event, for a time.
 """
 
@@ -100,7 +100,7 @@ async def within(event: asyncio.Event, seconds: float | None) -> None:
     """Return when the event is set, or after that time.
 
     By asyncio.timeout: until Python 3.12 asyncio.wait_for forgets to be cancelled where that comes together with what
-    it waits for, and whoever cancelled it waits for ever.
+    it waits for, and the cancelling task waits for ever.
     """
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds):

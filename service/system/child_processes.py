@@ -81,7 +81,7 @@ class Child:
         self._rights: Rights | None = None
 
     def rights(self) -> Rights | None:
-        """What it has given up. Waits for its start; None where it did not come to that."""
+        """The rights that it has given up. Waits for its start; None where it did not come to that."""
         if self._rights is None and answers(self.link, self.process.pid, START_SECONDS):
             with suppress(OSError, ValueError, TypeError):  # it has ended
                 self._rights = Rights(**json.loads(self.link.recv(RIGHTS_BYTES)))
@@ -100,7 +100,7 @@ class Child:
             return None
 
     def own_bytes(self) -> int:
-        """Of its memory what is no file and shared with nobody; 0 where it has ended."""
+        """Bytes of its memory that are no file and shared with nobody; 0 where it has ended."""
         try:
             with open(f"/proc/{self.process.pid}/statm") as sizes:
                 _, resident, shared, *_ = map(int, sizes.read().split())
@@ -165,7 +165,8 @@ class Children:
         self._give_back(child)
 
     def rights(self) -> Rights | None:
-        """What a child of these gives up; None where none could be started. Waits for a first one to start."""
+        """The rights that a child of these gives up; None where none could be started. Waits for a first one to
+        start."""
         with self.one() as child:
             child.given -= 1
             return child.rights()
@@ -201,5 +202,5 @@ class Children:
 
 
 def signal_name(exit_code: int) -> str:
-    """What ended a process, in words for a message."""
+    """The signal or exit code that ended a process, in words for a message."""
     return signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"

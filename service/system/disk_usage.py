@@ -1,4 +1,4 @@
-"""What files take on a disk: whole blocks and inodes, and not only the bytes that are in them.
+"""Disk usage of files: whole blocks and inodes, and not only the bytes that are in them.
 
 A file of 70 bytes takes a block of 4 KiB: what a million of them take is not 70 MB.
 """
@@ -36,12 +36,12 @@ class Usage:
 
 
 def usage(found: os.stat_result) -> Usage:
-    """Of a file that is there."""
+    """The usage of a file that is there."""
     return Usage(found.st_blocks * ST_BLOCK, 1)
 
 
 def expected(sizes: Iterable[int]) -> Usage:
-    """Of files that are to be written, by their sizes in bytes."""
+    """The usage of files that are to be written, by their sizes in bytes."""
     total = Usage()
     for size in sizes:
         total += Usage(-(-size // BLOCK) * BLOCK, 1)
@@ -49,7 +49,7 @@ def expected(sizes: Iterable[int]) -> Usage:
 
 
 def trouble(error: BaseException, folder: Path) -> str:
-    """What to tell callers about an error of the disk that `folder` is on, which may be full without saying so."""
+    """The words for callers about an error of the disk that `folder` is on, which may be full without saying so."""
     if getattr(error, "errno", None) in NO_ROOM or free(folder) < FULL_BYTES:
         return FULL
     return "the server's disk has a problem"

@@ -18,7 +18,7 @@ def end_with(parent: int) -> bool:
 
 
 def end_with_pipe(descriptor: int) -> bool:
-    """Has the kernel end this process with whoever holds the pipe's other end; False when nobody does."""
+    """Has the kernel end this process with the one that has the pipe's other end; False when none has it."""
     # Opened anew: one description, which children share, has one owner to signal. SIGIO ends a process that
     # does not handle it, in the middle of a driver's compiler too.
     own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
@@ -28,7 +28,7 @@ def end_with_pipe(descriptor: int) -> bool:
 
 
 def hung_up(end: int) -> bool:
-    """True if nobody holds the other end any more."""
+    """True if no process has the other end any more."""
     poll = select.poll()
     poll.register(end, 0)
     return bool(poll.poll(0))

@@ -38,7 +38,7 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
     """Have all records of the standard library's logging written to stderr, as `form`: "console" or "json".
 
     `level` is the least that is written of our own; libraries have theirs from warnings on. With `queued` a thread of
-    its own writes it, so that whoever logs never waits. `secrets` are left out of every line.
+    its own writes it, so that logging never waits. `secrets` are left out of every line.
     """
     output = Output()
     output.setFormatter(Json(secrets) if form == "json" else Console(secrets, sys.stderr.isatty()))
@@ -193,8 +193,8 @@ class Written(QueueListener):
 
 
 def _place(kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> Place:
-    """What is equal for errors that are raised by the same line of code, called in the same way; its kind and line
-    come first."""
+    """A key that is equal for errors that are raised by the same line of code, called in the same way; its kind and
+    line come first."""
     lines: list[str] = []
     while trace is not None:
         lines.append(f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}")
@@ -292,7 +292,7 @@ class Console(Redacting):
 
 
 def _event(record: logging.LogRecord) -> str:
-    """What happened, as one line."""
+    """The event as one line."""
     return "; ".join(line.strip() for line in record.getMessage().splitlines() if line.strip())
 
 

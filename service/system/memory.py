@@ -54,7 +54,7 @@ class _Account:
 
 
 class _Work:
-    """What a piece of work takes while it is done, as the sum of its parts."""
+    """The memory of a piece of work while it is done, as the sum of its parts."""
 
     def __init__(self, hold: Callable[[int], None]) -> None:
         self._hold = hold
@@ -89,7 +89,7 @@ def takes(part: str, size: int) -> None:
 
 
 class Holder:
-    """What bytes can be counted for where nothing else has just their lifetime."""
+    """An object that bytes can be counted for where nothing else has just their lifetime."""
 
 
 class MemoryBudget:

@@ -1,5 +1,5 @@
-"""What each caller has of something that all of them share, so that nobody can take so much that others are refused;
-whom the work at hand is for, and turns at what few can use at a time, which go round these callers.
+"""Shares of something that all callers use, so that nobody can take so much that others are refused; the caller whom
+the work at hand is for, and turns at what few can use at a time, which go round the callers.
 """
 
 from __future__ import annotations

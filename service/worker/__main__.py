@@ -60,8 +60,8 @@ def main() -> int:
     except BaseException:
         log.exception("the renderer failed")
         code = 1
-    # At once, its end of the link with it: on a busy machine an interpreter takes seconds to tidy up, and whoever is
-    # killed meanwhile does not tell any more that it ended by itself.
+    # At once, its end of the link with it: on a busy machine an interpreter takes seconds to tidy up, and a process
+    # that is killed meanwhile cannot report any more that it ended by itself.
     logging.shutdown()
     os._exit(code)
 

@@ -19,17 +19,17 @@ TURN_S = 0.03  # no lead: the length of an ordinary turn, a slice and the tile t
 # What a client had beyond that lead it owes, and pays back as a surcharge on its turns: this share of each. It owes
 # no more than so many seconds; for the rest of a longer turn it waits until each of the others has had as much.
 SURCHARGE, MOST_OWED_S = 0.125, 1.0
-# Whoever has waited for a frame for longer than this (s) goes first, up to this share of the device. With equal time
-# alone the costliest scenes of a crowd wait twice as long as the mean one.
+# A task that has waited for a frame for longer than this (s) goes first, up to this share of the device. With equal
+# time alone the costliest scenes of a crowd wait twice as long as the mean one.
 LATE_S, LATE_SHARE = 2.0, 1 / 16
 
 
 @dataclass
 class Account:
-    """What a client used of the device, or a task of its client's part, in seconds of virtual time."""
+    """The use of the device by a client, or by a task of its client's part, in seconds of virtual time."""
 
     used_s: float = 0.0
-    counted_s: float = 0.0  # without what is owed; whoever has the least goes next
+    counted_s: float = 0.0  # without what is owed; the account with the least goes next
 
     def charge(self, seconds: float) -> None:
         self.counted_s += seconds + min(self.used_s - self.counted_s, SURCHARGE * seconds)
@@ -46,7 +46,7 @@ class Account:
 
 
 class Seen(NamedTuple):
-    """What everybody, a task's client and the task had used of the device when the task's last frame was sent (s)."""
+    """The use of the device by everybody, a task's client and the task when the task's last frame was sent (s)."""
 
     all_s: float
     client_s: float

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class Phase(Enum):
-    """What the picture needs next; derived from what there is, so that the two cannot disagree."""
+    """The picture's next step; derived from what there is, so that the two cannot disagree."""
 
     EMPTY = "nothing was loaded, or that failed"
     COMPILING = "an update waits for its kernel"
@@ -258,7 +258,7 @@ class TaskPicture:
 
     def request_frame(self, want: Want) -> None:
         """Note which frame is wanted; `answer` sends it."""
-        # Who looks at the first hits has more samples of them traced than a guess needs.
+        # A view of the first hits has more samples of them traced than a guess needs.
         self.prior.wanted = want.view.prior and want.view.aov == "color"
         self.frames.denoising.set_view(want.view)
         self.frames.want = want

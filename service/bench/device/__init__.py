@@ -1,4 +1,4 @@
-"""What a device can do, measured in one run: `sunbox bench gpu`.
+"""Measurements of a device in one run: `sunbox bench gpu`.
 
 run         every part in turn, within the time that was given
 report      the figures as they stand in the JSON file

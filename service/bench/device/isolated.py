@@ -38,7 +38,7 @@ class Isolated:
         theirs.close()
 
     def result(self, timeout_s: float) -> Any:
-        """What the function returned. Raises Lost. In either case the process has ended."""
+        """The function's result. Raises Lost. In either case the process has ended."""
         try:
             if not self._answer.poll(max(0.0, timeout_s)):
                 raise Lost(f"not done after {timeout_s:.0f} s")

@@ -1,5 +1,5 @@
-"""What is done with a picture's samples: resolving, reading back and encoding them; merging blocks of them that other
-renderers trace; dispatching them in slices of several lengths and sizes.
+"""Times of the work on a picture's samples: resolving, reading back and encoding them; merging blocks of them that
+other renderers trace; dispatching them in slices of several lengths and sizes.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Missing(_Row):
 
 
 class Device(_Row):
-    """What the driver says of the device, and `describe` of the machine."""
+    """The device by its driver's words, and the machine by `describe`."""
 
     renderer: str
     version: str

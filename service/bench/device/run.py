@@ -38,14 +38,14 @@ class _Run:
         self.missing.append({"what": what, "why": why})
 
     def part(self, what: str, function: Callable[..., Any], *arguments: Any, cache: Path | None = None) -> Any:
-        """What `function(*arguments)` returns in a process of its own; None where it gave nothing."""
+        """Returns `function(*arguments)`, called in a process of its own; None where it gave nothing."""
         return self.here(what, lambda: self.isolated(function, *arguments, cache=cache).result(self.patience_s))
 
     def isolated(self, function: Callable[..., Any], *arguments: Any, cache: Path | None = None) -> Isolated:
         return Isolated(cache or self.cache, function, *arguments)
 
     def here(self, what: str, call: Callable[[], Any]) -> Any:
-        """What `call` returns; None where it failed, or the time is over."""
+        """Returns `call()`; None where it failed, or the time is over."""
         spent = time.perf_counter() - self.began
         if spent > 1.5 * self.options.seconds + PART_S:
             self.lacks(what, f"left out: {spent:.0f} s had gone, of {self.options.seconds:.0f} s that were given")

@@ -1,4 +1,4 @@
-"""What the built-in scenes cost on a device: paths per second, compile times and memory; then one kernel for many
+"""Costs of the built-in scenes on a device: paths per second, compile times and memory; then one kernel for many
 scenes beside a scene's own, caustics by both ways of finding them, and the orders in which a tree may be walked.
 """
 

@@ -48,7 +48,7 @@ class Parameter:
 
     @property
     def default(self) -> Any:
-        """What it is where a document leaves it out: None where the schema does not say."""
+        """The value where a document leaves it out; None where the schema does not say."""
         return self.hints.get("default")
 
     @property
@@ -134,7 +134,7 @@ def parameters(model: type[AnySurface]) -> dict[str, Parameter]:
 
 
 def _highlight(of: Mapping[str, Parameter]) -> Mapping[str, Any]:
-    """What the schema says of the width of the highlight: {field, as, color}; nothing where there is none."""
+    """The schema's entry for the width of the highlight: {field, as, color}; empty where there is none."""
     found = ({"field": p.name} | p.hints["x-highlight"] for p in of.values() if "x-highlight" in p.hints)
     return next(found, {})
 

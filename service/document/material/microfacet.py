@@ -215,7 +215,7 @@ class MicrofacetMaterial(SolidSurface):
 
     @property
     def alpha_range(self) -> Range:
-        """What alpha may be; a texture's values are clamped to it."""
+        """The range of alpha; a texture's values are clamped to it."""
         return ALPHA_RANGES[self.distribution]
 
 

@@ -1,4 +1,4 @@
-"""What `openpbr` and other models say in other words: the parts of a conversion that no common name carries.
+"""Conversions between `openpbr` and models that say the same in other words: the parts that no common name carries.
 
 Each function changes `made` and gives the names of `old` that it made use of.
 """
@@ -70,7 +70,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def _walk(old: Document, made: Document) -> set[str]:
-    """What is under the surface of an `openpbr`; flat where it has no radius."""
+    """Write a subsurface as that of an `openpbr`; it is flat where it has no radius."""
     if "base_color" in old:
         made["subsurface_color"] = old["base_color"]
     radius = _linear(old["subsurface_radius"]) if old.get("subsurface_radius") is not None else (0.0, 0.0, 0.0)
@@ -82,7 +82,7 @@ def _walk(old: Document, made: Document) -> set[str]:
 
 
 def _walked(old: Document, made: Document) -> set[str]:
-    """What is under the surface, of an `openpbr`, in other words."""
+    """Write the subsurface of an `openpbr` as that of another model."""
     names = {name for name in old if name.startswith("subsurface_")}
     if old.get("subsurface_weight", 0) == 0:
         return names

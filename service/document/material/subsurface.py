@@ -1,4 +1,4 @@
-"""What lies under the surface of `principled` and `openpbr`: media that light walks in, and those behind glass."""
+"""Light under the surface of `principled` and `openpbr`: media that it walks in, and those behind glass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What materials of every model may have: emission, a normal map, and nearly always opacity."""
+"""Parameters that materials of every model may have: emission, a normal map, and nearly always opacity."""
 
 from __future__ import annotations
 

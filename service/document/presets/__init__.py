@@ -82,8 +82,8 @@ def get(kind: str, name: str) -> dict[str, Any]:
 
 
 def likely() -> tuple[dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]:
-    """What a client is likely to look at: the scene with which the editor begins, that scene of other materials, and
-    the other scenes but tests."""
+    """The documents that a client is likely to look at: the scene with which the editor begins, that scene of other
+    materials, and the other scenes but tests."""
     shown = get("scenes", DEFAULT_SCENE)
     edits = [dressed(shown, get("materials", name)) for name in FAVOURITES]
     others = [each["name"] for each in names("scenes") if each["name"] != DEFAULT_SCENE and "group" not in each]
@@ -105,7 +105,7 @@ def dressed(scene: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
 
 
 def default_environment() -> dict[str, Any]:
-    """What lights a scene that brings no light of its own."""
+    """The light of a scene that brings none of its own."""
     return get("environments", "studio")
 
 

@@ -61,7 +61,7 @@ def parameter_rows() -> dict[str, Any]:
 
 
 def parameter_labels() -> bytes:
-    """Of each row on its left, and 0, 0.5 and 1 above their columns."""
+    """Labels: each row's on its left, and 0, 0.5 and 1 above the columns."""
     end, top = (STEPS - 1) / 2, (len(ROWS) - 1) / 2
     rows = [(name.replace("_", " "), -end - 0.75, top - row, 1.0) for row, name in enumerate(ROWS)]
     return written([*rows, *((f"{x + 0.5:g}", x * 2 * end, top + 0.85, 0.5) for x in (-0.5, 0.0, 0.5))], LETTERS)
@@ -91,7 +91,7 @@ def parameter_grid() -> dict[str, Any]:
 
 
 def grid_labels() -> bytes:
-    """Of each block its specular above it; of the roughness below, of the metallic on the left."""
+    """Labels of each block: its specular above it, the roughness below, the metallic on the left."""
     apart, reach = len(GRID) + 0.6, (len(GRID) - 1) / 2
     lines = []
     for block, specular in enumerate(GRID_SPECULAR):

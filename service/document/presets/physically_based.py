@@ -80,7 +80,7 @@ def document(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _typical(values: list[float]) -> float:
-    """Of a range and what is most common the latter; the middle of a range; the only value."""
+    """The most common value where a range names one; the middle of a range; the only value."""
     return values[2] if len(values) == 3 else sum(values) / len(values)
 
 
@@ -111,7 +111,7 @@ def _turned(n: float, k: float, reflectance: float) -> tuple[float, float]:
 
 
 def _absorption(rates: list[float]) -> dict[str, Any]:
-    """What holds inside a body that absorbs at these rates, 1/cm; the body's surface tints nothing then."""
+    """Parameters of a body that absorbs at these rates, 1/cm; its surface tints nothing then."""
     most = max(rates)
     if most < TRANSPARENT:
         return {}

@@ -1,4 +1,4 @@
-"""What materials are shown on: a shader ball, a torus knot, and the cyclorama behind them."""
+"""Subjects that materials are shown on: a shader ball, a torus knot, and the cyclorama behind them."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def tumbler() -> bytes:
 
 
 def whisky() -> bytes:
-    """What fills the tumbler: it climbs the glass a little."""
+    """The liquid that fills the tumbler: it climbs the glass a little."""
     mesh = Mesh()
     lathe(mesh, _liquid(BOTTOM, 0.4, INSIDE, TUMBLER_TALL, FILLED, 0.12), around=128)
     return mesh.file()

@@ -15,7 +15,7 @@ COLORS = ("base_color", "albedo", "diffuse")  # names of a model's colour
 
 @dataclass(frozen=True)
 class Asked:
-    """What shapes ask of a material: glTF says there what the document says of the shape."""
+    """Properties of shapes that glTF has in the material."""
 
     double_sided: bool = True
     fades: bool = False  # vertices have an alpha

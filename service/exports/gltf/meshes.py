@@ -148,7 +148,7 @@ class Meshes:
         self.losses.add(pointer, "its positions and normals are rounded to single precision")
 
     def _tangents(self, tangents: Floats, normals: Floats, pointer: str) -> Floats:
-        """Of length 1, with a sign, as the specification demands."""
+        """Tangents of length 1 with a sign, as the specification demands."""
         length = np.linalg.norm(tangents[:, :3].astype(np.float64), axis=1)
         odd = np.abs(length - 1) > UNIT
         signs = np.where(tangents[:, 3] < 0, np.float32(-1), np.float32(1))

@@ -34,7 +34,7 @@ ALPHA = 3
 
 @dataclass(frozen=True)
 class Plane:
-    """What a channel of a glTF texture is to hold: a channel of a document's texture, or a number within 0..1."""
+    """The source of one channel of a glTF texture: a channel of a document's texture, or a number within 0..1."""
 
     reference: Reference | None = None
     channel: int = 0

@@ -31,7 +31,7 @@ def parse_cube(data: bytes) -> LutData:
 
 
 class _Reader:
-    """What was read so far."""
+    """The state of a reader between two lines."""
 
     def __init__(self) -> None:
         self.axes = self.side = 0

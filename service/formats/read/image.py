@@ -154,7 +154,8 @@ def _opened(format: str, path: str) -> Iterator[Any]:
 
 @contextmanager
 def _path(data: bytes) -> Iterator[str]:
-    """Of a file in memory: OpenImageIO reads by path only, and this process may open no file that can be uploaded."""
+    """A path to a file in memory: OpenImageIO reads by path only, and this process may open no file that can be
+    uploaded."""
     with open(os.memfd_create("sunbox-image", os.MFD_CLOEXEC), "wb") as file:
         file.write(data)
         file.flush()

@@ -29,7 +29,7 @@ CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
 
 @dataclass(frozen=True)
 class Lines:
-    """What followed one keyword, a line each; `lines` are the numbers of these lines in the file."""
+    """The text after one keyword, a line each; `lines` are the numbers of these lines in the file."""
 
     text: bytes
     lines: Longs

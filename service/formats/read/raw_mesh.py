@@ -1,4 +1,4 @@
-"""What a mesh reader found, before anybody may trust it."""
+"""A mesh as its reader found it, before anybody may trust it."""
 
 from dataclasses import dataclass, field
 

@@ -90,7 +90,7 @@ class Sandbox:
             child.given = 0
 
     def rights(self) -> Rights:
-        """Which rights a child gives up before it reads a file. Waits for the first child, and logs it once."""
+        """The rights that a child gives up before it reads a file. Waits for the first child, and logs it once."""
         with self._asking:
             if self._rights is None:
                 try:

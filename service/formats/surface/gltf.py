@@ -47,7 +47,7 @@ def gltf_pbr(s: Inputs) -> None:
 
 
 def common(s: Inputs) -> None:
-    """What glTF's older model of specular and glossiness has as well."""
+    """Read the inputs that glTF's older model of specular and glossiness has as well."""
     s.put("base_color", "base_color", s.tree("base_color"))
     s.put("metallic", "metallic", s.tree("metallic"), 0.0)
     s.put("roughness", "roughness", s.tree("roughness"))
@@ -103,7 +103,7 @@ def _specular(s: Inputs) -> None:
 
 
 def _inside(s: Inputs, is_body: bool) -> None:
-    """What passes a surface goes through a body that has a thickness, else through a thin wall."""
+    """Read the transmission: light goes through a body that has a thickness, else through a thin wall."""
     if not is_body:
         s.material["thin_walled"] = True
         return

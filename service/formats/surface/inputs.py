@@ -1,4 +1,4 @@
-"""What a model reads a surface shader by: its inputs as trees, and the material that they make.
+"""A surface shader as a model reads it: its inputs as trees, and the material that they make.
 
 A format's reader says what the inputs of its file are. What they mean stands in the files of the models, once for all
 formats.

@@ -1,4 +1,4 @@
-"""What several models have in common, as parameters of `principled`."""
+"""Parts that several models have in common, as parameters of `principled`."""
 
 from __future__ import annotations
 

@@ -51,7 +51,8 @@ def _reflecting(s: Inputs) -> None:
 
 
 def _opacity(s: Inputs) -> None:
-    """What is left out lets light through, as glass does; with a threshold, or as presence, it is not there."""
+    """Read the opacity: what is left out lets light through, as glass does; with a threshold, or as presence, it is
+    not there."""
     threshold, opacity = s.number("opacityThreshold", 0), s.constant("opacity")
     is_glass = threshold == 0 and s.number("opacityMode", 0) != PRESENCE
     if is_glass and opacity is not None:

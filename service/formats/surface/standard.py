@@ -177,7 +177,7 @@ def _same(s: Inputs, parameter: str, name: str) -> None:
 
 
 def _below(s: Inputs) -> None:
-    """What light does below the surface, whose radius is a colour times a scale."""
+    """Read the subsurface, whose radius is a colour times a scale."""
     _same(s, "subsurface_weight", "subsurface")
     s.put("subsurface_color", "subsurface_color", s.tree("subsurface_color"))
     radius, scale = s.triple("subsurface_radius", WHITE), s.number("subsurface_scale", 1.0)

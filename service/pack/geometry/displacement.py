@@ -31,7 +31,8 @@ CUT_ONE, CUT_TWO, CUT_THREE = range(1, 4)
 
 @dataclass(frozen=True)
 class Displacement:
-    """What moves a mesh. `axes` is the linear part of its transform: heights and edges are metres in the world."""
+    """A height that moves a mesh. `axes` is the linear part of its transform: heights and edges are metres in the
+    world."""
 
     field: HeightField
     max_edge: float | None

@@ -58,7 +58,7 @@ def recipe_words(use: TextureReference, stops: int) -> np.ndarray:
 
 
 def channel_of(ramp: RampTexture) -> int:
-    """Of the texel that the ramp reads: that of coordinates has u in red and v in green."""
+    """The channel of the texel that the ramp reads: that of coordinates has u in red and v in green."""
     return "rgba".index(ramp.input.channel) if isinstance(ramp.input, RampInput) else "uv".index(ramp.input)
 
 

@@ -1,4 +1,4 @@
-"""What the owner of several renderers learns of each of them."""
+"""Events of each of several renderers, for their owner."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from service.renderers.statistics import Kind
 
 
 class Events(Protocol):
-    """What the owner of several renderers learns of one of them, on the event loop."""
+    """Events of one of several renderers, for their owner, on the event loop."""
 
     def changed(self) -> None:
         """The process is ready or lost, waits for a place, or will not be started again for a while."""
@@ -31,7 +31,7 @@ class Events(Protocol):
         """A process that did not know this task has been sent all of it."""
 
     def kind_of(self, task: int) -> Kind:
-        """Whose work another renderer's task is, which this one assists."""
+        """The kind of another renderer's task, which this one assists."""
 
 
 class Alone:

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class ProcessEvents(Protocol):
-    """What a keeper says of its process, on the event loop."""
+    """Events of a keeper's process, on the event loop."""
 
     def received(self, message: Heard) -> None:
         """The process has sent this."""

@@ -57,7 +57,7 @@ class Waiting:
 
 
 class RendererProcess(Protocol):
-    """What a supervisor asks of the process that renders, on whichever machine that runs."""
+    """The process that renders, as its supervisor uses it, on whichever machine it runs."""
 
     began: float  # by time.monotonic
     ready: bool  # set by the supervisor, as `unable`
@@ -247,7 +247,7 @@ def _spawn(
     command += [] if lifeline is None else ["--lifeline", str(lifeline)]
     # A driver, which nothing confines, works there on strangers' scenes: no key may be in its reach.
     # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
-    # stdout is the command line's, who may be read by a script that waits for its end.
+    # The CLI's stdout may be read by a script that waits for its end.
     return subprocess.Popen(
         command,
         env=_environment(options),

@@ -107,7 +107,7 @@ class Supervisor:
 
     @property
     def waiting(self) -> str:
-        """What the renderer waits for, where there is no place for it; it takes tasks, which wait with it."""
+        """The reason why there is no place for the renderer, which waits for one; its tasks wait with it."""
         return self._keeper.waiting
 
     @property
@@ -333,7 +333,7 @@ class Supervisor:
         task.listener.again()
 
     def _lose_task(self, number: int) -> None:
-        """An error of the server keeps a message from whom it is for, whom nothing reaches any more in order."""
+        """End a task after an error of the server, by which a message was lost: the next ones would lack it."""
         if (task := self._forget(number)) is not None:
             self._keeper.send(Drop(number))
             task.listener.lost(MISTAKE)

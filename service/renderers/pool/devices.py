@@ -1,4 +1,4 @@
-"""Which renderers the configuration asks for, and what each of them gets of the machine."""
+"""The renderers that the configuration asks for, and what each of them gets of the machine."""
 
 from __future__ import annotations
 

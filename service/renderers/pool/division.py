@@ -1,4 +1,4 @@
-"""Which renderers assist which tasks; leases and their results are handed on between them."""
+"""Division of tasks: which renderers assist which; leases and their results are handed on between them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Peer(Protocol):
 
     @property
     def driver(self) -> str | None:
-        """What decides about equal bits; None while it cannot render."""
+        """The driver, which decides about equal bits; None while it cannot render."""
 
     @property
     def leases(self) -> Counter[str]:
@@ -33,7 +33,7 @@ class Peer(Protocol):
     def relay_encoded(self, encoded: Encoded) -> None: ...
 
     def scene_of(self, task: int) -> Iterable[Encoded | ToRenderer]:
-        """What another renderer has to be told to have the scene and the settings of this one's task."""
+        """Messages that give another renderer the scene and the settings of this one's task."""
 
 
 @dataclass
@@ -129,7 +129,7 @@ class Division:
             self.assign()
         elif isinstance(message, Failed) and message.serial is None:
             held.active = message.fallback is not None
-            self._leave(message.task, held)  # they may have what the home has not
+            self._leave(message.task, held)  # assistants may hold a newer scene
             self.assign()
 
     def told(self, task: int) -> None:
@@ -174,7 +174,7 @@ class Division:
         self.assign()
 
     def assign(self) -> None:
-        """Choose anew who assists whom; to be called when a renderer has come, gone or changed."""
+        """Choose anew which renderer assists which; to be called when one has come, gone or changed."""
         tasks = [
             held for held in self._tasks.values() if held.active and undivided(held.adaptive, held.time_limit) is None
         ]
@@ -182,7 +182,7 @@ class Division:
         free = [n for n, peer in enumerate(self._peers) if n not in busy | self._wrong and peer.driver is not None]
         chosen: dict[int, list[int]] = {id(held): [] for held in tasks}
         share = -(-len(free) // max(1, len(tasks)))
-        for held in tasks:  # who assists already goes on, as far as that is still wanted
+        for held in tasks:  # assistants go on, as far as they are still wanted
             for each in held.assistants[:share]:
                 if each in free and self._wants(held, each, chosen[id(held)]):
                     chosen[id(held)].append(each)

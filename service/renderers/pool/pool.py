@@ -1,4 +1,4 @@
-"""Several renderers behind one door: which of them gets a task, and who goes on with the tasks of a lost one."""
+"""Several renderers behind one door: which of them gets a task, and which goes on with the tasks of a lost one."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Pool:
 
     @property
     def waiting(self) -> str:
-        """What all renderers wait for, for which there is no place; "" where one of them renders, or starts."""
+        """The reasons why there is no place for any renderer; "" where one of them renders, or starts."""
         reasons = [each.waiting for each in self.supervisors]
         return " ".join(dict.fromkeys(reasons)) if all(reasons) else ""
 
@@ -233,14 +233,14 @@ class Pool:
         self._division.dropped(task)
 
     def _kind_of(self, task: int) -> Kind:
-        """Whose work a renderer does on a task that it assists."""
+        """The kind of a task that a renderer assists."""
         home = self.homes.get(task)
         held = None if home is None else home.tasks.get(task)
         return "server" if held is None else held.kind
 
 
 class _Seated(Events):
-    """What the pool makes of the events of one of its renderers."""
+    """The pool's answers to the events of one of its renderers."""
 
     def __init__(self, pool: Pool, number: int) -> None:
         self._pool, self._number = pool, number

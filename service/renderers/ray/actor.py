@@ -74,7 +74,7 @@ class Renderer:
             channel.discard(encoded)
 
     async def hear(self) -> list[FromRenderer | Ended]:
-        """What the renderer has said since the last call, as soon as there is something; nothing after a while."""
+        """The renderer's messages since the last call, as soon as there are some; an empty list after a while."""
         outgoing, news = self._outgoing, self._news
         if not outgoing:
             news.clear()

@@ -68,7 +68,7 @@ class Cluster:
 
     @property
     def device(self) -> str:
-        """What a renderer has of its node, as /v1/info says it."""
+        """A renderer's share of its node, as /v1/info says it."""
         return described(self.joined.resources)
 
     def rest(self, number: int) -> None:
@@ -106,7 +106,7 @@ class Cluster:
         return self._resting.keys()
 
     def starter(self, number: int) -> Start:
-        """What starts a supervisor's renderer; `number` counts the renderers from 0."""
+        """The `Start` of a supervisor's renderer; `number` counts the renderers from 0."""
         return partial(ClusterProcess, partial(self._carry, number), self.watch)
 
     def _carry(self, number: int, end: socket.socket) -> int:

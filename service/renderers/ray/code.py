@@ -1,4 +1,4 @@
-"""Which code a node runs: other code would give other bits, or not understand a message."""
+"""The code that a node runs: other code would give other bits, or not understand a message."""
 
 from __future__ import annotations
 

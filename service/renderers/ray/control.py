@@ -1,4 +1,4 @@
-"""What the server and the gateway say to each other beside the renderers' own messages."""
+"""Messages between the server and the gateway beside the renderers' own."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def _stay_on_this_machine() -> None:
 
 
 def survey(ask: Join, local: bool) -> Joined:
-    """What there is in the cluster that was joined, and what each renderer gets of it; may wait for `ask.nodes_s`."""
+    """The resources of the cluster that was joined, and each renderer's share of them; may wait for `ask.nodes_s`."""
     import ray
 
     nodes = _nodes(ask)

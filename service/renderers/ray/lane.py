@@ -89,7 +89,7 @@ class Lane:
         self._over.set()
 
     def release(self) -> None:
-        """End as one that is not needed now; whoever calls it ends the actor."""
+        """End as one that is not needed now; the caller ends the actor."""
         self._loss = "released"
 
     def leave(self) -> None:
@@ -251,7 +251,7 @@ async def _answer(reference: Any) -> Any:
 
 
 def _said(error: Exception) -> str:
-    """What Ray's error says in one line: of a traceback from a node the last, with the node's address."""
+    """Ray's error in one line: of a traceback from a node the last, with the node's address."""
     lines = [line.strip() for line in re.sub(r"\x1b\[\d+m", "", str(error)).splitlines() if line.strip()]
     if len(lines) < 2:
         return "".join(lines)[:300]

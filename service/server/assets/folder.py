@@ -91,7 +91,7 @@ class AssetFolder:
                 change.remove(self.file(id, suffix))
 
     def usage(self) -> Usage:
-        """What all assets take together; leftovers of a crash are not counted. Raises OSError."""
+        """The disk usage of all assets; leftovers of a crash are not counted. Raises OSError."""
         known = self._totals.read()
         if known is None:
             if not self.path.exists():

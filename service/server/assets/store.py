@@ -211,7 +211,7 @@ class AssetStore:
         self.loader.sandbox.start()
 
     def rights(self) -> Rights:
-        """Which rights the processes that parse uploads have given up. Waits for the first of them."""
+        """The rights that the processes that parse uploads have given up. Waits for the first of them."""
         return self.loader.sandbox.rights()
 
     def close(self) -> None:

@@ -63,7 +63,7 @@ class Batch:
         self.jobs: dict[int, Render] = {}
         self.shown: WeakValueDictionary[int, Render] = WeakValueDictionary()
         self.finished = asyncio.Event()
-        self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; whoever waits clears it
+        self.changed = asyncio.Event()  # a render ended, or the batch was cancelled; the waiting task clears it
         self.ended_at = 0.0  # by the monotonic clock
         self.making = asyncio.Lock()  # while one of its files is made
         self._stored_bytes = 0  # of the renders that are rows
@@ -106,7 +106,7 @@ class Batch:
 
     @property
     def ids(self) -> Iterator[str]:
-        """Of the renders that were made."""
+        """Names of the renders that were made."""
         return (member_id(self.id, step) for step in self.steps.that_are_made())
 
     def finish_if_done(self) -> None:
@@ -154,7 +154,7 @@ class Batch:
         return self.snapshot()()
 
     def snapshot(self) -> Callable[[], dict[str, Any]]:
-        """What makes the status, for any thread: that of 10 000 renders takes 20 ms."""
+        """A function that makes the status, for any thread: that of 10 000 renders takes 20 ms."""
         measured = self.steps.measured if not self.finished.is_set() else 0
         each_s = self.steps.busy_s / measured if measured else None
         return partial(self._status, self.state, self.steps.copy(), dict(self.jobs), each_s)
@@ -180,7 +180,7 @@ class Batch:
         return status(self.member(step), Outcome(state=self.state_of(step)), 0)
 
     def member(self, step: int) -> Order:
-        """What is known of a render before its turn: neither its settings nor its name."""
+        """A render's order before its turn: neither its settings nor its name are known."""
         return Order(
             member_id(self.id, step), self.owner, resolve(Settings()), self.order.label, self.order.priority,
             self.order.created_at,
@@ -191,8 +191,8 @@ _NOT_MADE, _UNDER_WAY, _FIRST_END = 0, 1, 2  # codes; from the last one on how i
 
 
 class Steps:
-    """What a batch knows of each of its renders, a byte each, whether that is in memory or a row of the store. For
-    the event loop, but for `copy`, which is its caller's."""
+    """A batch's state of each of its renders, a byte each, whether that is in memory or a row of the store. For the
+    event loop, but for `copy`, which is its caller's."""
 
     def __init__(self, codes: bytes) -> None:
         self._codes = bytearray(codes)

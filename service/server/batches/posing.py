@@ -80,7 +80,7 @@ def _poses(axis: Times, pointer: str, scene: Any, storage: Storage, owner: str) 
 
 
 def _keys(things: Iterable[Thing]) -> list[tuple[str, int]]:
-    """What tells each of the file's things from the others: its name, and the number among those of that name."""
+    """Keys that tell each of the file's things from the others: its name, and the number among those of that name."""
     counts: dict[str, int] = defaultdict(int)
     keys = []
     for thing in things:

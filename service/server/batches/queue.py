@@ -174,7 +174,7 @@ class BatchQueue:
         self._renders.keep(batch)
 
     def _give_up(self, batch: Batch) -> None:
-        """End it, and those of its renders that are not made yet with it: whoever waits for it learns of that."""
+        """End it, and those of its renders that are not made yet with it: tasks that wait for it go on."""
         batch.cancelled = True
         self._cancel(batch)
         if batch.finished.is_set():
@@ -233,8 +233,8 @@ class BatchQueue:
         return True
 
     async def _read(self, batch: Batch) -> Members | None:
-        """Of a batch that an earlier server began, once there is memory for its document and the disk can be read;
-        None where it is cancelled before. Raises NotFound, TooLarge."""
+        """The renders of a batch that an earlier server began, once there is memory for its document and the disk can
+        be read; None where it is cancelled before. Raises NotFound, TooLarge."""
         assert self._renders.store is not None
         while not batch.cancelled:
             try:

@@ -159,7 +159,7 @@ class Callbacks:
         return LONGEST_S
 
     def _owners(self) -> list[str]:
-        """Those who may have another attempt: who has fewest comes first, then whose turn was the longest ago."""
+        """Owners that may have another attempt: first that of the fewest, then the one whose turn is longest ago."""
         shares = Shares(AT_ONCE, "attempts")
         for each in self._sending.values():
             shares.count(each.owner)
@@ -197,7 +197,7 @@ class Callbacks:
         asyncio.get_running_loop().call_later(AGAIN_S, self._sending.pop, callback.id, None)
 
     def _after(self, callback: Callback, answer: int | None, error: str | None) -> Callback:
-        """What becomes of a callback by an attempt."""
+        """The callback after an attempt."""
         now, attempts = time.time(), callback.attempts + 1
         more = attempts <= len(PAUSES) and answer != GONE
         known = replace(callback, attempts=attempts, answer=answer, error=error, next_at=None)

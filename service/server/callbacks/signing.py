@@ -24,7 +24,8 @@ KEY_BYTES = 32
 
 
 def headers(id: str, timestamp: int, body: bytes, secrets: Sequence[str]) -> dict[str, str]:
-    """Of one attempt, at `timestamp` s since 1970: a signature for each secret, so that one can replace another."""
+    """Headers of one attempt, at `timestamp` s since 1970: a signature for each secret, so that one can replace
+    another."""
     signed = f"{id}.{timestamp}.".encode() + body
     digests = (hmac.digest(secret_key(secret), signed, hashlib.sha256) for secret in secrets)
     signatures = " ".join(f"v1,{base64.b64encode(digest).decode()}" for digest in digests)

@@ -1,4 +1,4 @@
-"""What everybody may read goes out compressed: the editor's files, the API's description, schemas and presets.
+"""Compression of what everybody may read: the editor's files, the API's description, schemas and presets.
 
 All else goes out as it is. Pictures do not get smaller, and the length of a compressed answer that holds a secret
 beside text of a stranger's choice would tell of the secret (the attack is known as BREACH); these answers hold

@@ -58,7 +58,7 @@ class Watch:
         self._waits = waits
 
     def _wait(self, connection: Any, now: float) -> _Wait | None:
-        """What a connection waits for, and since when."""
+        """The thing that a connection waits for, and since when."""
         owed = _owed(connection)
         if owed is None:
             return None
@@ -127,7 +127,7 @@ def _rest_order(connection: Any) -> tuple[int, float]:
 
 
 def _owed(connection: Any) -> Owed | None:
-    """What uvicorn's connection waits for from its client; None: for nothing, or for the next request."""
+    """The thing that uvicorn's connection waits for from its client; None: for nothing, or for the next request."""
     if connection.transport.get_write_buffer_size():
         return "reading"
     if not _is_http(connection):  # a WebSocket has pings

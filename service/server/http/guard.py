@@ -303,7 +303,7 @@ def _origin(text: str) -> tuple[str, str, int | None]:
 
 
 class Keys:
-    """Which key a request carries, and a name for its owner that reveals nothing of the key."""
+    """The server's keys: finds a request's, and gives its owner a name that reveals nothing of the key."""
 
     def __init__(self, keys: Iterable[str]) -> None:
         self._keys = [key.encode() for key in keys]

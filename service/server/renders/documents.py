@@ -1,4 +1,4 @@
-"""What the documents of renders that wait or run take on the disk: each owner has its share of that."""
+"""Disk usage of the documents of renders that wait or run: each owner has its share of that."""
 
 from __future__ import annotations
 

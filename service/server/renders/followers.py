@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Followed(Protocol):
-    """What is followed: a render."""
+    """A render that is followed."""
 
     @property
     def id(self) -> str: ...
@@ -52,7 +52,7 @@ class Follower(Generic[T]):
 
 
 class Followers(Generic[T]):
-    """Who follows all renders of an owner."""
+    """The followers of all renders of an owner."""
 
     def __init__(self) -> None:
         self._by_owner: dict[str, list[Follower[T]]] = {}

@@ -272,7 +272,7 @@ class RenderQueue:
             raise
 
     async def _make_room_for(self, insert: Callable[[], Awaitable[int]], missing: int) -> int:
-        """What `insert` gives, for which ended renders make room. Raises QuotaUsedUp where there are none."""
+        """Returns `await insert()`, for which ended renders make room. Raises QuotaUsedUp where there are none."""
         while True:
             try:
                 return await insert()

@@ -93,7 +93,7 @@ class Render(Listener):
     counts_as = 1  # of the renders of its owner that are kept
     waits = False  # for memory, the disk or a renderer, which was logged
     batch: InBatch | None = None  # which has the document, and learns of the end
-    resting: KeepsPictures | None = None  # None: whoever asked for it releases it
+    resting: KeepsPictures | None = None  # None: the caller releases it
     task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it
     ended_at = 0.0  # by the monotonic clock, once it has ended
     _has_slot = False
@@ -122,7 +122,9 @@ class Render(Listener):
         self.renderers, self.order = renderers, order
         self.scene = RenderScene(order.settings, load, document, packed, budget, waiting, patch, base)
         self.id, self.owner, self.priority = order.id, order.owner, order.priority
-        self.client = order.owner or order.id  # who shares the slots with others: without keys each is its own client
+        self.client = (
+            order.owner or order.id
+        )  # that shares the slots with others: without keys each is its own client
         self.finished, self.over, self.left = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self.changes = Changes[Any]()
         self.viewer = PictureViewer(self)
@@ -193,7 +195,7 @@ class Render(Listener):
         return self.finished.is_set() or not self.over.is_set()
 
     def snapshot(self, kernel: bool = False) -> Callable[[], dict[str, Any]]:
-        """What makes its status as it is now, for any thread."""
+        """A function that makes its status as it is now, for any thread."""
         return partial(status, self.order, self.outcome, self.renderers.tracing(self.task), kernel)
 
     def status(self, kernel: bool = False) -> dict[str, Any]:
@@ -317,7 +319,7 @@ class Render(Listener):
             self.renderers.send(Stop(task))
 
     async def _checkpoint(self, task: int) -> Restore | None:
-        """What it goes on from, of which the progress counts from now on."""
+        """The picture it goes on from, of which the progress counts from now on."""
         restore = None
         if self.recorder is not None and self.recorder.store.has(self.id, "checkpoint"):
             restore = await self.recorder.store.read(self.id, "checkpoint", task)

@@ -1,6 +1,6 @@
-"""Which ended renders make room: those of an owner of too many, those of who keeps most bytes, and old ones; which of
-them stay with the renderer, so that looking at them takes no time; and those of batches, which are rows of the store
-and objects while somebody looks at them, or the renderer has their pictures."""
+"""Retention of ended renders. First to make room are those of an owner of too many, those of the owner that stores
+most, and old ones. Some stay with the renderer, so that looking at them takes no time; those of batches are rows of
+the store, and objects while somebody looks at them, or the renderer has their pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Retention:
-    """Which of the ended renders are kept."""
+    """Limits on the ended renders that are stored."""
 
     kept: int  # renders of each owner, of those of batches ten times as many
     kept_bytes: int  # of the pictures and documents of all of them
@@ -62,7 +62,7 @@ class Kept(Protocol):
 
     @property
     def counts_as(self) -> int:
-        """Of the renders of its owner that are kept, how many it is."""
+        """The number that it counts as among its owner's stored renders."""
 
 
 T = TypeVar("T", bound=Kept)
@@ -124,7 +124,8 @@ class KeptRenders(Generic[T]):
         return max(0.0, min(ends) + self._bounds.kept_s - now) if ends else None
 
     def _take_largest(self, size: int) -> list[T]:
-        """Of the owner of most bytes the oldest, and not those of another owner of few, until `size` is reached."""
+        """Oldest renders of the owner that stores most, until `size` bytes are freed; not those of another owner of
+        few."""
         goes = list[T]()
         while size > 0 and self._count > 1:
             for owner, _ in self._bytes.most_common(2):

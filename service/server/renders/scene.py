@@ -164,7 +164,7 @@ class RenderMemory:
 
     @property
     def bytes(self) -> int:
-        """Of the scene and the picture while the renderer has them."""
+        """Bytes of the scene and the picture while the renderer has them."""
         return self._pictures + COPIES * self.scene_bytes
 
     @property

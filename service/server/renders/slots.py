@@ -20,7 +20,7 @@ from service.server.renders.turns import Turns
 from service.system.background import Background, reported
 
 AGAIN_S = 5.0  # between two attempts to begin a render that waits for memory, the disk or a renderer
-LOOK_S = 1.0  # between two looks at who waits
+LOOK_S = 1.0  # between two looks at the renders that wait
 PATIENCE_S = 30.0  # for which others pass a render that waits for memory; then, for as long, only small ones do
 AT_ONCE = 64  # renders that are looked at in one go, which takes a millisecond
 FEW = 8  # of one owner
@@ -159,7 +159,7 @@ class Slots:
         return False
 
     def _held_back(self, job: Render) -> bool:
-        """True if it would take memory that another one has waited for: so no stream of renders starves a large one.
+        """True while a large render is waiting for memory that this one would use: no stream of renders starves it.
 
         Only for half of the time, as what that one waits for may be endless."""
         first = next(iter(self._lacking), job)
@@ -217,7 +217,7 @@ class Slots:
         self._handed_over(waiting)
 
     def _gave_up(self, error: Exception) -> None:
-        """An error of the server ended the hand-over: whoever gave its slot back by then comes back into line."""
+        """An error of the server ended the hand-over: renders that gave their slots back by then queue again."""
         if self._claim is not None:
             self._handed_over(self._claim)
 
@@ -237,7 +237,7 @@ class Slots:
 class Interruptible(Protocol):
     @property
     def client(self) -> str:
-        """Who has the slot: its owner, or where there are no owners the render alone."""
+        """The client that has the slot: its owner, or where there are no owners the render alone."""
 
     @property
     def owner(self) -> str: ...

@@ -1,4 +1,4 @@
-"""Whose render starts next: the owners go round, and among one's own the higher priority goes first."""
+"""The order in which renders start: the owners go round, and among one's own the higher priority goes first."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Turns(Generic[T]):
 
     @property
     def owners(self) -> Collection[str]:
-        """Those who wait."""
+        """The renders that wait."""
         return self._queues.keys()
 
     def line(self, owner: str) -> Sequence[T]:

@@ -95,7 +95,7 @@ class PictureViewer(Listener):
             self._sampled.clear()
 
     def interrupt(self, error: ServiceError) -> None:
-        """Answer those who wait with this; others may ask again."""
+        """Answer pending reads with this; others may ask again."""
         self._reads.answer_all(error)
 
     def refuse(self, error: ServiceError) -> None:
@@ -105,7 +105,7 @@ class PictureViewer(Listener):
         self._reads.answer_all(error)
 
     def close(self) -> None:
-        """End the task that shows what was stored. Those who wait ask the render's own task then, or have left."""
+        """End the task that shows what was stored. Pending reads go to the render's own task then, or have ended."""
         if self.task is not None:
             self._render.renderers.drop(self.task)
             self.task = None

@@ -64,7 +64,7 @@ def parse_batch(config: Config, body: bytearray | memoryview) -> ParsedBatch:
 
 
 def variations(base: Any, axes: str) -> Variations:
-    """Of what is stored of a batch."""
+    """The variations of a stored batch."""
     return Variations(base, _STORED_AXES.validate_json(axes))
 
 

@@ -53,7 +53,7 @@ _MATERIAL: TypeAdapter[Material] = TypeAdapter(Material)
 
 @dataclass(frozen=True)
 class BsdfRequest:
-    """What an EvaluateBsdf asks. Directions (n, 3) and (m, 3) float64, unit length."""
+    """The question of an EvaluateBsdf. Directions (n, 3) and (m, 3) float64, unit length."""
 
     question: BsdfQuestion
     material: Material

@@ -49,7 +49,7 @@ class ParserPool:
         self._room = _Room(config.max_json_memory)
 
     def parse(self, kind: Kind, body: bytearray, hold: Callable[[int], None] | None = None) -> Any:
-        """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time.
+        """Returns the result of PARSERS[kind], or raises; TooLarge where it takes too much memory or time.
 
         `hold` is called with the bytes that this takes at most, before they are taken, to count them for as long as
         there is the result; without it they count already."""
@@ -140,7 +140,7 @@ def _ask(child: Child, work: Work) -> Any:
 
 def allowed(module: str, name: str) -> Any:
     """The class of that name, where an answer may have it: models of documents, errors, what PARSERS return, and
-    arrays of numbers. Whoever took over the parser cannot name a function. Raises UnpicklingError."""
+    arrays of numbers. A parser that was taken over cannot name a function. Raises UnpicklingError."""
     if (module, name) in ARRAYS:
         return getattr(importlib.import_module(module), name)
     if module.startswith("service."):

@@ -1,4 +1,4 @@
-"""What JSON bodies are read as, by name; and the classes that a reading is made of."""
+"""Parsers of JSON bodies, by name; and the classes that a reading is made of."""
 
 from __future__ import annotations
 

@@ -47,8 +47,8 @@ class RequestReader(RequestParser):
         """`owner`: whose assets the scene may use; "": all, for scenes of the server itself and without keys.
 
         `hold` is called with the bytes that packing takes, before it takes them; by default they count on their own.
-        The packed scene counts in the memory until it is garbage, or until whoever counts it from then on releases
-        it there. Raises TooLarge, Unavailable as well.
+        The packed scene counts in the memory until it is garbage, or until its next owner releases it there. Raises
+        TooLarge, Unavailable as well.
         """
         assets = self._assets if self._access is None else self._access.view(owner, scene)
         with _under("/scene"), self.memory.growing("scenes") as own, work(hold or own):

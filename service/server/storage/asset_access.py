@@ -1,4 +1,4 @@
-"""Which assets a key may use: those of other keys seem not to exist."""
+"""Access to assets by key: those of other keys seem not to exist."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class AssetAccess:
             return {id for (id,) in rows}
 
     def allowed(self, owner: str, uses: Sequence[Use]) -> AllowedUses:
-        """What may be stored as used by a document of this owner.
+        """The uses that may be stored for a document of this owner.
 
         Raises InvalidDocument with the pointers of references to assets that do not exist, or that this owner may not
         use, which look the same.

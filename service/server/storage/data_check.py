@@ -1,4 +1,4 @@
-"""Whether a data folder is sound: the database, the documents and assets in it, and the leftovers of a crash.
+"""A check that a data folder is sound: the database, the documents and assets in it, and the leftovers of a crash.
 
 The check writes nothing, so that a server may use the folder meanwhile; files that it writes or deletes during the
 check are no faults.

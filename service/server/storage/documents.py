@@ -63,7 +63,7 @@ def etag(body: bytes) -> str:
 
 @dataclass(frozen=True)
 class Condition:
-    """What the stored document must be, by the headers If-Match and If-None-Match of RFC 9110."""
+    """A condition on the stored document, by the headers If-Match and If-None-Match of RFC 9110."""
 
     is_match: tuple[str, ...] | None = None  # one of these tags, or "*" for any document
     is_none: tuple[str, ...] | None = None  # none of these tags, or "*" for no document

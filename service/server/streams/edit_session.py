@@ -79,7 +79,7 @@ class EditSession:
         return update
 
     def _diff(self, old: Version, new: Version) -> SceneDiff:
-        """What differs between two versions; the last difference is stored, as it is asked for more than once."""
+        """The difference between two versions; the last one is stored, as it is asked for more than once."""
         if self._difference is None or self._difference[0] is not old or self._difference[1] is not new:
             self._difference = old, new, scene_diff(old.scene, new.scene)
         return self._difference[2]

@@ -46,7 +46,8 @@ def scene_diff(old: Scene, new: Scene) -> SceneDiff:
 
 
 def _beside(scene: Scene, drawn: Scene) -> tuple[object, ...]:
-    """What is not drawn and could be refused all the same: textures, and what materials ask of these and of files."""
+    """Parts that are not drawn and could be refused all the same: textures, and what materials ask of these and of
+    files."""
     textures = {name: texture for name, texture in scene.textures.items() if name not in drawn.textures}
     asked = [(getattr(m, "asset", None), _looks(m)) for n, m in scene.materials.items() if n not in drawn.materials]
     return textures, [each for each in asked if any(each)]
@@ -69,7 +70,8 @@ def _displaced(scene: Scene) -> list[MeshShape]:
 
 
 def _skeleton(scene: Scene) -> tuple[object, ...]:
-    """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
+    """The parts that arrays, light tables and kernels are made from: equal skeletons differ in values that are edited
+    in place.
 
     Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
     which parameter reads which texture, and which file a material has; factors are not. A mesh whose highlight is

@@ -1,4 +1,4 @@
-"""Whether two pictures differ beyond noise, where, and with which certainty.
+"""Verdicts: do two pictures differ beyond noise, where, and with which certainty.
 
 evidence    sums over independent groups of samples of both
 decision    tests that need no knowledge of how noise is distributed; the corrected p-values

@@ -146,7 +146,7 @@ def same(source: Source, confidence: float) -> Verdict:
 
 
 class _Limits:
-    """What ends a comparison beside its samples: the settings' time and noise."""
+    """The limits of a comparison beside its samples: the settings' time and noise."""
 
     def __init__(self, *sources: Source) -> None:
         limits = [each.settings.time_limit for each in sources]
@@ -222,7 +222,7 @@ async def _looked(evidence: Evidence, schedule: Schedule, best: Decision) -> Dec
 
 
 async def _together(*renders: Awaitable[Taken]) -> list[Taken]:
-    """What all of them give; if one fails or this is cancelled, the others are cancelled."""
+    """The results of all; if one fails or this is cancelled, the others are cancelled."""
     tasks = [asyncio.ensure_future(each) for each in renders]
     try:
         return await asyncio.gather(*tasks)
@@ -323,7 +323,8 @@ class UnderWay:
 
     @contextmanager
     def following(self, owner: str, name: str | None) -> Iterator[OnProgress]:
-        """What a comparison calls as it goes on. Without a name nobody asks; of two with one the later counts."""
+        """A function that a comparison calls as it goes on. Without a name nobody asks; of two with one the later
+        counts."""
         key = (owner, name or "")
 
         def note(taken: int, most: int) -> None:

@@ -1,4 +1,4 @@
-"""Whether two pictures differ beyond noise: tests that need no knowledge of how noise is distributed.
+"""Decides if two pictures differ beyond noise, by tests that need no knowledge of how noise is distributed.
 
 Where a and b have the same expectation, each of many small differences d_i is as likely positive as negative. Then,
 whatever their sizes, S = sum d_i over V, V^2 = sum d_i^2, has tails little above those of a normal variable N:
@@ -44,7 +44,7 @@ class Level:
 
 @dataclass
 class Decision:
-    """What one look at the evidence says. `levels` go from the smallest regions to the whole picture."""
+    """The result of one look at the evidence. `levels` go from the smallest regions to the whole picture."""
 
     p_value: float = 1.0
     levels: list[Level] = field(default_factory=list)

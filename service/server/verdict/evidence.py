@@ -1,4 +1,4 @@
-"""What is known of two pictures: sums over independent groups of samples, from which the tests are made."""
+"""Evidence about two pictures: sums over independent groups of samples, from which the tests are made."""
 
 from __future__ import annotations
 
@@ -104,14 +104,14 @@ class Evidence:
 
     @property
     def rounding(self) -> Array:
-        """What the difference may be by rounding alone."""
+        """The difference that rounding alone may make."""
         return np.asarray(0.5 * ROUNDING * (np.abs(self.a.mean) + np.abs(self.b.mean)) @ CHANNELS)
 
     @property
     def variance(self) -> Array:
-        """Of the difference by the samples' own variances, as if a and b were independent, and both had the larger
-        one of their two variances of a sample: so the side with few samples, which may have missed the rare bright
-        ones, is not taken to be more certain than the other one says."""
+        """Variance of the difference by the samples' own variances, as if a and b were independent, and both had the
+        larger one of their two variances of a sample: so the side with few samples, which may have missed the rare
+        bright ones, is not taken to be more certain than the other one says."""
         a, b = self.a, self.b
         of_a, of_b = np.maximum(a.variance, b.variance * (b.samples / a.samples)), b.variance
         of_b = np.maximum(of_b, a.variance * (a.samples / b.samples))

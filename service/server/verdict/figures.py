@@ -53,7 +53,7 @@ def pbr_neutral(color: Array) -> Array:
 
 
 def figures(a: Array, b: Array) -> Figures:
-    """Of two pictures' mean radiance, (height, width, 3) each."""
+    """The figures of two pictures' mean radiance, (height, width, 3) each."""
     difference = (b - a) @ LUMINANCE
     shown_a, shown_b = displayed(a), displayed(b)
     error = float(((shown_b - shown_a) ** 2).mean())
@@ -72,7 +72,7 @@ def flip_map(shown_a: Array, shown_b: Array) -> Array:
 
 
 def differing(a: Array, b: Array, p: Array, alpha: float) -> Differing:
-    """Of two pictures' mean radiance and their `p_map`."""
+    """The differing pixels of two pictures' mean radiance, by their `p_map`."""
     known = p < alpha
     apart = np.abs(displayed(b) - displayed(a)).mean(axis=-1)
     return Differing(float(known.mean()), float(apart[known].mean()) if known.any() else 0.0)
@@ -137,7 +137,7 @@ def _opponent(linear: Array) -> Array:
 
 
 def _filtered(opponent: Array) -> Array:
-    """What the eye resolves, as linear Rec.709 within 0 to 1: equations 4 to 6."""
+    """The picture that the eye resolves, as linear Rec.709 within 0 to 1: equations 4 to 6."""
     radius = math.ceil(3 * math.sqrt(0.04 / (2 * math.pi**2)) * PIXELS_PER_DEGREE)
     seen = []
     for channel, terms in enumerate(SENSITIVITY):
@@ -170,7 +170,7 @@ def _distance(a: Array, b: Array) -> Array:
 
 
 def _feature_difference(a: Array, b: Array) -> Array:
-    """Of edges and points, whichever differ more: equation 13 and section 4.3."""
+    """The difference of edges or of points, whichever differ more: equation 13 and section 4.3."""
     sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE
     radius = math.ceil(3 * sigma)
     smooth, x = gaussian(sigma, radius), np.arange(-radius, radius + 1)

@@ -1,4 +1,5 @@
-"""What a process gives up before it works on strangers' data, so that these can cost no more than its limits.
+"""Confinement: a process gives up its rights before it works on strangers' data, so that these can cost no more than
+its limits.
 
 child         how a child that parses begins: its limits, the rights that it gives up for good, work within bounds
 kernel        the numbers of system calls, and the kernel's seccomp and Landlock

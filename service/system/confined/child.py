@@ -1,6 +1,6 @@
-"""What every child does that parses strangers' files or texts: how it begins, what it may take (its place behind
-others, memory, processor time, files), what it may do (whatever reading a file does not need is given up, as far
-as the kernel knows how), and how it works on one of them.
+"""The frame of every child that parses strangers' files or texts: how it begins, what it may take (its place behind
+others, memory, processor time, files), what it may do (whatever reading a file does not need is given up, as far as
+the kernel knows how), and how it works on one of them.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ CAPABILITY_VERSION = 0x20080522  # _LINUX_CAPABILITY_VERSION_3
 
 @dataclass(frozen=True)
 class Rights:
-    """Which rights a process has given up, of those that the kernel can take."""
+    """The rights that a process has given up, of those that the kernel can take."""
 
     no_new_privileges: bool = False  # no program that it could start would have more rights
     no_capabilities: bool = False  # root's

@@ -213,7 +213,7 @@ class Home:
         return foreign
 
     def bands(self) -> list[Result]:
-        """What is done of blocks that are not merged yet, for a checkpoint; nothing where the block under way has not
+        """Finished bands of blocks that are not merged yet, for a checkpoint; none where the block under way has not
         taken long, and little would be lost with it."""
         if self._ledger is None or not self.sharing or time.monotonic() - self._began < WORTH_SAVING_S:
             return []

@@ -1,4 +1,4 @@
-"""Which bands of a picture's blocks are free, leased or done. Runs without GL and without a clock of its own."""
+"""The ledger of a picture's bands: which are free, leased or done. Runs without GL and without a clock of its own."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Block:
 
 
 class Ledger:
-    """Of one picture of `width` x `height` pixels and one generation, from one of its borders on."""
+    """The ledger of one picture of `width` x `height` pixels and one generation, from one of its borders on."""
 
     def __init__(self, width: int, height: int, end: int, numbers: Iterator[int]) -> None:
         """`end`: the samples of the whole render. `numbers` name the leases; none comes twice."""
@@ -181,7 +181,7 @@ class Ledger:
 
     @property
     def oldest(self) -> tuple[int, Outstanding] | None:
-        """Of the leases of the current block, the one that was given first, with its number."""
+        """The oldest lease of the current block, with its number."""
         first = -1 if self.current is None else self.current.first
         mine = [(number, lease) for number, lease in self.outstanding.items() if lease.band.first == first]
         return min(mine, key=lambda each: each[1].since, default=None)

@@ -195,7 +195,7 @@ class CompileClient:
                 self._begin(lane)
 
     def _add(self, priority: Priority, key: KernelKey, done: Done, client: str) -> bool:
-        """Queue a kernel, where the line is shortest, or join who waits for it. False: no helper can be started."""
+        """Queue a kernel, where the line is shortest, or join its callers. False: no helper can be started."""
         lane = min(self._lanes[priority], key=lambda lane: (key not in lane.wanted, len(lane.wanted)))
         if key in lane.wanted:
             lane.wanted[key][done] = client
@@ -271,7 +271,7 @@ class CompileClient:
             log.warning("compiled ahead in vain: the driver has no disk cache to write to")
 
     def _refuse(self, key: KernelKey, detail: str) -> None:
-        """Nobody compiles the kernel, nor the renderer: whoever needs it is told why."""
+        """Refuse the kernel: neither a helper nor the renderer compiles it, and its callers get the reason."""
         log.warning("a kernel could not be compiled", {"entry": key.entry, "error": detail})
         if len(self._refused) >= REMEMBERED:
             self._refused.clear()
@@ -279,7 +279,7 @@ class CompileClient:
 
 
 def compilers(is_software: bool, cores: int) -> int:
-    """How many processes a priority has. On the processor one: it takes the time of those who trace."""
+    """The number of processes of a priority. On the processor one: compiling takes time from tracing."""
     return 1 if is_software else max(1, min(MOST_COMPILERS, cores // CORES_A_COMPILER))
 
 

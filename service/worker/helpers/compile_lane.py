@@ -32,7 +32,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Compiled:
-    """What a helper answers; `cached`: the kernel is in the driver's disk cache. `detail`: the driver refused it."""
+    """A helper's answer; `cached`: the kernel is in the driver's disk cache. `detail`: the driver refused it."""
 
     milliseconds: float
     cached: bool
@@ -55,7 +55,7 @@ class Lane:
     memory: int = 0  # bytes that its process may take for kernels, for what is said of one that needs more
     begins: float = 0.0  # by the monotonic clock: nothing is compiled before
     paused: bool = False
-    wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # whom to call, and the client of each
+    wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # callbacks, and the client of each
     key: KernelKey | None = None  # the one under way
     until: float = 0.0  # by the monotonic clock: when it takes too long
     runnable: RunnableTime | None = None  # of its process since it began
@@ -92,7 +92,8 @@ class Lane:
 
     def choose(self) -> KernelKey:
         """The next kernel: of the client that was served longest ago, or that came first."""
-        served = {k: min((self.served.get(c, 0) for c in who.values()), default=0) for k, who in self.wanted.items()}
+        turns = {k: [self.served.get(client, 0) for client in callers.values()] for k, callers in self.wanted.items()}
+        served = {key: min(each, default=0) for key, each in turns.items()}
         self.key = min(self.wanted, key=lambda key: served[key])
         self.begun += 1
         if len(self.served) > REMEMBERED:
@@ -110,7 +111,7 @@ class Lane:
         self.runnable = None if self.helper.process_id is None else RunnableTime(self.helper.process_id)
 
     def hear(self) -> Compiled | Refused | None:
-        """What became of the kernel under way; None where nothing did yet. A kernel whose process did not start, or
+        """The result of the kernel under way; None where there is none yet. A kernel whose process did not start, or
         was killed by somebody, is in line again."""
         try:
             answer: Started | Compiled = self.helper.hear()
@@ -149,7 +150,7 @@ class Lane:
         return None
 
     def end(self) -> dict[Done, str]:
-        """Take the kernel under way out of the line; whom to call."""
+        """Take the kernel under way out of the line. Returns its callbacks."""
         assert self.key is not None
         key, self.key = self.key, None
         self.killed.pop(key, None)

@@ -39,7 +39,7 @@ class FallbackPreview:
 
     @property
     def scale(self) -> float | None:
-        """Of what there is to see."""
+        """The scale of the picture that is shown."""
         return self._look.scale
 
     @property

@@ -33,7 +33,7 @@ BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cor
 
 
 class _Content(NamedTuple):
-    """What a frame shows: one with equal content would show nothing new."""
+    """The content of a frame: one with equal content would show nothing new."""
 
     generation: int
     scale: float

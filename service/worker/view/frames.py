@@ -42,7 +42,7 @@ _baked: OrderedDict[tuple[str, str], ViewTable] = OrderedDict()
 
 
 class _Content(NamedTuple):
-    """What a frame shows: one with equal content would show nothing new."""
+    """The content of a frame: one with equal content would show nothing new."""
 
     generation: int
     scale: float

@@ -89,9 +89,7 @@ class _Importer:
         )  # fmt: skip
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:
-        """The exposure that suits the file's lights, where 0 does not. It is noted, and so is that nothing else
-            lights the
-        scene."""
+        """The exposure that suits the file's lights, None where 0 does. Both this and the missing sky are noted."""
         place = "/extensions/KHR_lights_punctual"
         stops = metering.exposure(document, self.placements.placed(), aspect)
         if stops is not None:

@@ -143,7 +143,7 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
 
 
 def own_notes(place: JsonView) -> dict[str, Any]:
-    """What our exporter noted in an object's `extras`; nothing where somebody else wrote something there."""
+    """Our exporter's notes in an object's `extras`; empty where something else stands there."""
     extras = place.value.get("extras")
     noted = extras.get("sunbox") if isinstance(extras, dict) else None
     return noted if isinstance(noted, dict) else {}

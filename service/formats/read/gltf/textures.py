@@ -111,7 +111,7 @@ class Textures:
         return self._references[place.pointer]
 
     def channels(self, info: JsonView) -> str:
-        """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" without an image that can be read."""
+        """The channels of a texture's image: "L" (grey), "RGB" and "A" joined; "" where no image can be read."""
         place = self.source(self.file.follow(info, "index", "textures"))
         if place is None:
             return ""

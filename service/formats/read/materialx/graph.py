@@ -105,7 +105,7 @@ class Graphs:
         return Tree("constant", size, value=np.zeros(size, np.float32))
 
     def _connected(self, given: Any, owner: Any, scope: Scope | None) -> Tree | None:
-        """What an input is connected to; None where it has a value of its own."""
+        """The tree that an input is connected to; None where it has a value of its own."""
         parent = owner.getParent()
         interface = given.getInterfaceName()
         if interface:

@@ -1,5 +1,5 @@
-"""What the operations of the standard library compute, for arrays of texels: (n, size), or (1, size) where all texels
-have the same. They mean what the library's GLSL means (MaterialX, libraries/stdlib/genglsl)."""
+"""Operations of the standard library for arrays of texels: (n, size), or (1, size) where all texels have the same.
+They mean what the library's GLSL means (MaterialX, libraries/stdlib/genglsl)."""
 
 from __future__ import annotations
 

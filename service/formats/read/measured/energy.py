@@ -41,7 +41,7 @@ def warnings(theta: Doubles, albedo: Doubles) -> Iterator[str]:
 
 
 def mean_albedo(theta: Doubles, albedo: Doubles) -> tuple[float, float, float]:
-    """What of light from all sides comes back, per channel."""
+    """The share of light from all sides that comes back, per channel."""
     angles = np.linspace(0, np.pi / 2, ANGLES)
     weight = np.sin(2 * angles)
     r, g, b = (

@@ -104,7 +104,7 @@ def _between(place: Doubles) -> tuple[np.ndarray, np.ndarray, Doubles]:
 
 
 def _above_horizon() -> np.ndarray:
-    """Which cells, by their middles, have both directions in front of the surface."""
+    """True for cells that have, by their middles, both directions in front of the surface."""
     h, d, p = np.ix_(*(np.arange(n) + 0.5 for n in SHAPE))
     theta_h, theta_d, phi_d = 0.5 * np.pi * (h / 90) ** 2, 0.5 * np.pi * d / 90, np.pi * p / 180
     upright, tilt = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)

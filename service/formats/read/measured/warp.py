@@ -14,8 +14,8 @@ from service.formats.types import Doubles
 
 @dataclass(frozen=True)
 class Warp:
-    """Of a stack of densities (..., rows, columns): `density` integrates to 1 over each square, `across` is its
-    integral along each line up to each column, and `down` (..., rows) that of the lines up to each row."""
+    """A stack of densities (..., rows, columns): `density` integrates to 1 over each square, `across` is its integral
+    along each line up to each column, and `down` (..., rows) that of the lines up to each row."""
 
     density: Doubles
     across: Doubles

@@ -1,4 +1,4 @@
-"""What the importers of whole scenes share.
+"""Parts that the importers of whole scenes share.
 
 part_files  meshes and images that become assets of their own, equal ones once
 ply_writer  a mesh as a PLY file, for the store

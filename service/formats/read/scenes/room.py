@@ -74,7 +74,7 @@ def _enclosed(placed: list[Placed], bounds: Bounds) -> float:
 
 
 def _sums(one: Placed) -> tuple[float, Doubles]:
-    """Of all triangles: the sum of a corner times the area vector, and that of the area vectors."""
+    """Sums over all triangles: of a corner times the area vector, and of the area vectors."""
     dot, area = 0.0, np.zeros(3)
     for at in range(0, len(one.faces), CHUNK):
         a, b, c = (one.vertices[one.faces[at : at + CHUNK, k]].astype(np.float64) for k in range(3))

@@ -26,7 +26,7 @@ def turned(data: bytes, limits: AssetLimits) -> bytes:
 
 
 def place(texels: np.ndarray, channel: str) -> int:
-    """Which axis of the texels a channel is; the first of a grey image, or where there is no alpha."""
+    """The last axis' index of a channel; 0 for a grey image, or where there is no alpha."""
     at = CHANNELS.index(channel or "r")
     return at if at < texels.shape[2] else 0
 
@@ -42,5 +42,5 @@ def _complement(values: np.ndarray) -> np.ndarray:
 
 
 def _png(texels: np.ndarray) -> bytes:
-    """Of 8 bits where the image had bytes, else of 16."""
+    """A PNG of 8 bits where the image had bytes, else of 16."""
     return encode(texels, "png", bits=8 if texels.dtype == np.uint8 else 16)

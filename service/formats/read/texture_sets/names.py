@@ -1,4 +1,4 @@
-"""What an image is of, by the words of its file name, and of which material.
+"""Roles of images, and the materials they belong to, by the words of their file names.
 
 The words are those that ambientCG, Poly Haven, Quixel, textures.com, FreePBR, 3dtextures and Poliigon use, and those
 of Substance's exports for Unreal Engine, Unity and glTF.
@@ -72,7 +72,7 @@ _ROLES: dict[str, Role] = {word: role for role, words in WORDS.items() for word 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What an image is of. `channels`: for each role the channel that it has of it, or "" for the whole image."""
+    """The role of an image. `channels`: for each role the channel that has it, or "" for the whole image."""
 
     material: str  # what is left of the name; "" where nothing is
     channels: dict[Role, str]
@@ -85,8 +85,8 @@ class Meaning:
 
 
 def meaning(stem: str) -> Meaning | None:
-    """What the image with this file name, without its ending, is of; None where no word says. The last word that
-    says it decides."""
+    """The role of the image with this file name, without its ending; None where no word says. The last word that says
+    it decides."""
     udim = UDIM.search(stem) is not None
     words = [(found.start(), found.end(), found[0].lower()) for found in WORD.finditer(stem)]
     found = _last([text for _, _, text in words])
@@ -124,7 +124,8 @@ def _last(words: Sequence[str]) -> tuple[int, int, dict[Role, str], bool | None]
 
 
 def _mark(words: Sequence[str], k: int) -> tuple[bool | None, int]:
-    """Which way green points by the words beside `normal`, and the place of the last that belongs to it."""
+    """True where green points as in DirectX by the words beside `normal`, None where they do not say; and the place
+    of the last word that belongs to it."""
     for near in (k + 1, k - 1):
         word = words[near] if 0 <= near < len(words) else ""
         if word in OPENGL or word in DIRECTX:

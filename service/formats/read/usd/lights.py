@@ -41,7 +41,7 @@ class Lamp:
 
 @dataclass
 class Lights:
-    """What shines in a file, as it is found."""
+    """The lights of a file, as they are found."""
 
     time: Usd.TimeCode
     unit: float  # metres per unit of the stage

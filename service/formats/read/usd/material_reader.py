@@ -63,7 +63,7 @@ class Reader(PlainInputs):
         self.notes.add(self.surface.at(name), detail)
 
     def _materialx(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
-        """What a node of MaterialX is; None where it computes what is not read."""
+        """The value or texture of a MaterialX node; None where it computes what is not read."""
         kind = node.kind.removeprefix("ND_")
         self._unread = node
         if steps > MOST_STEPS:

@@ -57,7 +57,7 @@ class Node:
 
 
 def follow(given: UsdShade.Input | UsdShade.Output, time: Usd.TimeCode, default: Any = None) -> Any:
-    """What an input takes, through the interfaces of groups of nodes; `default` where nothing is said."""
+    """The value or node of an input, through the interfaces of groups of nodes; `default` where nothing is said."""
     sources = UsdShade.Utils.GetValueProducingAttributes(given)
     if not sources:
         return default

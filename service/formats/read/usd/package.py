@@ -78,7 +78,7 @@ class Package:
         return self._layers[name]
 
     def _replaced(self, layer: str, path: str) -> str:
-        """What stands in a layer instead of a path of its author."""
+        """The path that a layer gets instead of its author's."""
         found = self._located(layer, path)
         lower = path.lower()
         if found is not None and found.lower().endswith(USD_LAYERS):
@@ -144,7 +144,7 @@ def _fill(layer: Sdf.Layer, data: bytes | memoryview) -> None:
 
 
 def _said(error: Tf.ErrorException) -> str:
-    """What the library said of a file, without the names of its own sources."""
+    """The library's words about a file, without the names of its own sources."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = next((line.rpartition(" : '")[2].rstrip("'") for line in lines if " : '" in line), "it is broken")
     return re.sub(r" matching pxr\S+", "", said)[:200]

@@ -73,7 +73,7 @@ class Walk:
             stack += [(child, here, True, purpose) for child in reversed(self._children(prim))]
 
     def _instances(self, instancer: UsdGeom.PointInstancer, worlds: Doubles, depth: int) -> Iterator[Item]:
-        """What an instancer places: its prototypes are not shown by themselves."""
+        """The instances that an instancer places: its prototypes are not shown by themselves."""
         pointer = str(instancer.GetPath())
         if depth >= DEEPEST:
             raise ParseError(f"instancers are nested more than {DEEPEST} deep, or in a circle", pointer)

@@ -1,4 +1,4 @@
-"""Whether the stored renders of a data folder are sound. Nothing is written, and a server may use the folder."""
+"""A check that the stored renders of a data folder are sound. Nothing is written, and a server may use the folder."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check_renders(folder: Path, report: Report) -> int:
 
 
 def _notes(files: PictureFiles, folder: Path, known: set[str], gone: set[str]) -> Iterator[str]:
-    """What the next start moves or deletes."""
+    """Lines on what the next start moves or deletes."""
     for path in sorted(folder.iterdir() if folder.exists() else ()):
         if path.name.endswith(PART):
             yield f"{RENDERS}/{path.name}: left half-written by a crash; it is deleted at a start"
@@ -107,7 +107,7 @@ def _document(database: sqlite3.Connection) -> str:
 
 
 def _of_batch(database: sqlite3.Connection, number: int) -> tuple[bytes] | None:
-    """What a render's batch varies, where it is one of a batch."""
+    """The body of a render's batch, which says what varies; None where it is not one of a batch."""
     if not any(column[1] == "batch" for column in database.execute("PRAGMA table_info(renders)")):
         return None
     query = "SELECT body FROM batches JOIN renders ON renders.batch = batches.number WHERE renders.number = ?"

@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 class Unfit(Exception):
-    """What is stored cannot be understood; the text says what of it."""
+    """A stored document cannot be understood; the text says what of it."""
 
 
 def stored(values: Mapping[str, Any]) -> str:

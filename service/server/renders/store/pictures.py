@@ -133,7 +133,7 @@ class PictureFiles:
 
     @property
     def usage(self) -> Usage:
-        """Of all files but the lost ones."""
+        """Disk usage of all files but the lost ones."""
         return self._total
 
     def size(self, id: str) -> int:

@@ -1,4 +1,4 @@
-"""What is stored of one render, but for its document and its pictures."""
+"""The stored record of one render, but for its document and its pictures."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class IdempotencyKey:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What has become of a render so far. `problem` is the body of an RFC 9457 answer."""
+    """The outcome of a render so far. `problem` is the body of an RFC 9457 answer."""
 
     state: State = "queued"
     reason: Reason | None = None

@@ -149,7 +149,7 @@ class RenderRows:
         return None if row is None else stored_render(*row)
 
     def step(self, number: int) -> tuple[bytes, str, int] | None:
-        """Of a render of a batch: what varies, along which axes, and the step; None for any other render."""
+        """The base, the axes and the step of a batch's render; None for any other render."""
         with self._database.open() as database:
             found: tuple[bytes, str, int] | None = database.execute(
                 "SELECT batches.body, axes, step FROM renders JOIN batches ON batches.number = batch "

@@ -133,7 +133,7 @@ class RenderStore:
 
     @property
     def pictures(self) -> Usage:
-        """What all pictures take on the disk."""
+        """Disk usage of all pictures."""
         return self._files.usage
 
     def size(self, order: Order) -> int:
@@ -144,7 +144,7 @@ class RenderStore:
         return self._files.has(id, kind)
 
     def latest(self, id: str) -> Kind | None:
-        """What is stored of a render's picture; None: nothing."""
+        """The kind of a render's stored picture; None: nothing is stored."""
         return next((kind for kind in KINDS if self._files.has(id, kind)), None)
 
     def _checkpointed(self, id: str) -> Progress:
