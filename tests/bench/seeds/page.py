@@ -26,10 +26,9 @@ def markdown(document: Row) -> str:
         "",
         *_prose(
             "Sunbox grew out of three student programs: a renderer of one sphere with the `disney` model, a path"
-            " tracer"
-            " of spheres and boxes with a bounding volume hierarchy, and a comparison of reflection models. Here are"
-            " their experiments, repeated with Sunbox. `sunbox bench seeds --publish` measures everything and writes"
-            " this page."
+            " tracer of spheres and boxes with a bounding volume hierarchy, and a comparison of reflection models."
+            " Here are their experiments, repeated with Sunbox. `sunbox bench seeds --publish` measures everything"
+            " and writes this page."
         ),
         *_prose(
             f"Measured on two llvmpipe cores ({about['processor']}; {about['renderer']}), in"
@@ -53,9 +52,8 @@ def _fields(document: Row) -> Iterator[str]:
     )
     yield from _prose(
         f"Without a tree every ray tries every sphere: {most:,} take {last[NONE] / first[NONE]:.0f} times as long as"
-        f" {rows[0]['spheres']}. With Sunbox's tree it is {last[OURS] / first[OURS]:.1f} times. At {most:,}"
-        " spheres the"
-        f" tree is {last[NONE] / last[OURS]:.0f} times as fast as none."
+        f" {rows[0]['spheres']}. With Sunbox's tree it is {last[OURS] / first[OURS]:.1f} times. At {most:,} spheres"
+        f" the tree is {last[NONE] / last[OURS]:.0f} times as fast as none."
     )
     yield from _prose("Milliseconds for one path of each of 960 x 544 pixels (measured on fewer pixels of the view):")
     table = []
@@ -65,9 +63,8 @@ def _fields(document: Row) -> Iterator[str]:
         table.append([f"{row['spheres']:,}", *(f"{x:,.0f}" for x in ms), f"{ms[0] / ms[2]:.1f}", earlier])
     yield from _table(["spheres", "no tree", "one order", "Sunbox", "no tree / Sunbox", "earlier program"], table)
     yield from _prose(
-        "*One order* is Sunbox's tree, walked by all rays in the order in which it was built. Sunbox keeps"
-        " an order for"
-        " each octant of directions, so that near boxes come first and hide those behind them:"
+        "*One order* is Sunbox's tree, walked by all rays in the order in which it was built. Sunbox keeps an order"
+        " for each octant of directions, so that near boxes come first and hide those behind them:"
         f" {last[UNORDERED] / last[OURS] - 1:.0%} at {most:,} spheres."
     )
     yield from _prose("How boxes are divided while the tree is built. Time of tracing as a multiple of Sunbox's:")
@@ -76,9 +73,8 @@ def _fields(document: Row) -> Iterator[str]:
     ]
     yield from _table(["spheres", *SPLITS], table)
     yield from _prose(
-        f"Milliseconds of building the tree of {most:,} spheres and laying out its eight orders. Sunbox uses"
-        " 16 bins for"
-        " the surface area heuristic (SAH), and 8 where there are fewer than 24 boxes:"
+        f"Milliseconds of building the tree of {most:,} spheres and laying out its eight orders. Sunbox uses 16 bins"
+        " for the surface area heuristic (SAH), and 8 where there are fewer than 24 boxes:"
     )
     yield from _table(list(SPLITS), [[f"{rows[-1]['build_ms'][name]:.1f}" for name in SPLITS]])
     yield from _picture("Time over the number of spheres", "plot-spheres")
@@ -137,11 +133,10 @@ def _samples(document: Row) -> Iterator[str]:
     )
     yield from _picture("A metal ball in the light of a point, one sample", "point")
     yield from _prose(
-        f"At {size} x {size} a sample takes {found['point_ms']:.0f} ms in the light of a point,"
-        " where one is"
-        " enough but for smooth edges. The earlier program took 251 ms, and 36 ms after its work groups were"
-        " made 8 x 8 instead of 1 x 1. In the light of the cubemap, milliseconds for N samples of each of"
-        f" {size} x {size} pixels:"
+        f"At {size} x {size} a sample takes {found['point_ms']:.0f} ms in the light of a point, where one is enough"
+        " but for smooth edges. The earlier program took 251 ms, and 36 ms after its work groups were made 8 x 8"
+        f" instead of 1 x 1. In the light of the cubemap, milliseconds for N samples of each of {size} x {size}"
+        " pixels:"
     )
     counts = uniform["samples"]
     table = [
@@ -154,10 +149,9 @@ def _samples(document: Row) -> Iterator[str]:
     ]
     yield from _table(["N", "uniform", "Sunbox", "earlier program, uniform"], table)
     yield from _prose(
-        "A sample of Sunbox looks for the light several times at the first surface, besides following the"
-        " BSDF, and so"
-        " costs more than one direction. Root mean square error over the mean, on smaller pictures (with few uniform"
-        " samples hardly one has met the sun, and the error is still to grow):"
+        "A sample of Sunbox looks for the light several times at the first surface, besides following the BSDF, and"
+        " so costs more than one direction. Root mean square error over the mean, on smaller pictures (with few"
+        " uniform samples hardly one has met the sun, and the error is still to grow):"
     )
     columns = [f"{row['material']}, {row['way']}" for row in found["errors"]]
     table = [
@@ -175,9 +169,8 @@ def _samples(document: Row) -> Iterator[str]:
             f" directions would need about {ratio**2 * slower:,.0f} times Sunbox's time for it."
         )
     yield from _prose(
-        "The root mean square errors of the earlier program, for a diffuse ball under a sky with a sun, of"
-        " mean 0.433,"
-        " were 27.6, 6.5, 3.2, 1.6 and 0.83 with 1, 16, 64, 256 and 1 024 samples."
+        "The root mean square errors of the earlier program, for a diffuse ball under a sky with a sun, of mean"
+        " 0.433, were 27.6, 6.5, 3.2, 1.6 and 0.83 with 1, 16, 64, 256 and 1 024 samples."
     )
 
 
@@ -211,9 +204,8 @@ def _blur(document: Row) -> Iterator[str]:
     best = {way: min((row["error"][way], row["degrees"]) for row in rows)[1] for way in ways}
     verdicts = "; ".join(f"`{way}`: {degrees:g}" for way, degrees in best.items())
     yield from _prose(
-        f"The blur that leaves the least error, in degrees: {verdicts}. Where the estimator looks for the sun"
-        " by itself"
-        " there is little noise to take away, and a blur only takes from the picture."
+        f"The blur that leaves the least error, in degrees: {verdicts}. Where the estimator looks for the sun by"
+        " itself there is little noise to take away, and a blur only takes from the picture."
     )
 
 
@@ -223,18 +215,16 @@ def _reflection(document: Row) -> Iterator[str]:
     yield from _heading(
         "Reflection models",
         "reflection",
-        f"Rows: {', '.join(f'`{name}`' for name in names)}. Columns: {', '.join(found['lights'])}. All are a"
-        " red plastic"
-        " with highlights of about one width, and in soft light they are hard to tell apart. Look at the"
-        " third column,"
-        " whose sun stands low behind the knot: there light grazes the surface, and the models with Fresnel's"
-        " reflection and exact masking (`microfacet`, `principled`) have a bright edge that the older ones lack.",
+        f"Rows: {', '.join(f'`{name}`' for name in names)}. Columns: {', '.join(found['lights'])}. All are a red"
+        " plastic with highlights of about one width, and in soft light they are hard to tell apart. Look at the"
+        " third column, whose sun stands low behind the knot: there light grazes the surface, and the models with"
+        " Fresnel's reflection and exact masking (`microfacet`, `principled`) have a bright edge that the older ones"
+        " lack.",
     )
     side, base = found["size"], found["ms"]["principled"]
     yield from _prose(
-        f"Milliseconds for a path of each of {side} x {side} pixels, and as multiples of `principled`. The"
-        " time is the"
-        " knot's, whose triangles rays have to find; the models differ by less than what was measured can tell:"
+        f"Milliseconds for a path of each of {side} x {side} pixels, and as multiples of `principled`. The time is"
+        " the knot's, whose triangles rays have to find; the models differ by less than what was measured can tell:"
     )
     table = [[f"`{name}`", f"{found['ms'][name]:.0f}", f"{found['ms'][name] / base:.2f}"] for name in names]
     yield from _table(["model", "ms", "ratio"], table)
@@ -251,9 +241,8 @@ def _reflection(document: Row) -> Iterator[str]:
         yield from _table(["model", *angles], table)
     yield from _prose(
         "`principled` puts back what scatters more than once between microfacets, and stays at 1. Models of single"
-        " scattering lose it. `blinn_phong` and its kin are normalised by nothing: their energy is what"
-        " `specular` and"
-        " the exponent make of it, and it falls towards the edge, where that of a real surface rises."
+        " scattering lose it. `blinn_phong` and its kin are normalised by nothing: their energy is what `specular`"
+        " and the exponent make of it, and it falls towards the edge, where that of a real surface rises."
     )
     yield from _picture("Energy, Fresnel and highlights of the models", "plot-reflection")
     yield from _prose(
