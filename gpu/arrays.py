@@ -209,8 +209,8 @@ class SceneEdit:
         changes: dict[str, Any] = dict(self.moved or {})
         if self.materials is not None and len(self.materials) != len(arrays.materials):
             raise ValueError(f"{len(self.materials)} materials for a scene of {len(arrays.materials)}")
-        own = ("camera", "materials", "microfacets", "material_numbers")
-        changes |= {name: value for name, value in self._given.items() if name in own}
+        parts = ("camera", "materials", "microfacets", "material_numbers")
+        changes |= {name: value for name, value in self._given.items() if name in parts}
         if self.texture_words is not None and arrays.textures is not None:
             changes["textures"] = replace(arrays.textures, words=self.texture_words)
         lit = arrays.environment if self.environment_map is None else self.environment_map

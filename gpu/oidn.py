@@ -29,7 +29,7 @@ class GpuFilter:
         """Raises RuntimeError where the library has no part for this GPU, or cannot begin there."""
         import pyoidn
 
-        found = _own(gpu)
+        found = _device_of(gpu)
         if found is None:
             raise RuntimeError(f"Open Image Denoise does not find {gpu.name} among its devices")
         number, self.name = found
@@ -89,7 +89,7 @@ class GpuFilter:
             raise RuntimeError(f"{what}: {error}")
 
 
-def _own(gpu: Device) -> tuple[int, str] | None:
+def _device_of(gpu: Device) -> tuple[int, str] | None:
     """The number of the library's device that is EGL's `gpu`, and a name for it; None where it has none.
 
     NVIDIA's EGL and CUDA say the same UUID. Mesa's UUIDs are of its own making: other cards are told by their places

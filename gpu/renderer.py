@@ -40,7 +40,7 @@ class Renderer:
         self._uniform_buffer = self.context.buffer(reserve=layout.Uniforms.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self.context)
 
-    def _own(self) -> None:
+    def _use_context(self) -> None:
         if threading.get_ident() != self._thread:
             raise WrongThread("a Renderer belongs to the thread that made it")
         contexts.use(self.context)
@@ -57,7 +57,7 @@ class Renderer:
 
         Raises SceneTooLarge, OutOfMemory.
         """
-        self._own()
+        self._use_context()
         _check(arrays)
         return Scene(self.context, arrays, editing, self._shared, everything, raised)
 
@@ -67,7 +67,7 @@ class Renderer:
 
         Raises SceneTooLarge, OutOfMemory.
         """
-        self._own()
+        self._use_context()
         _check(arrays)
         return FallbackScene(self.context, arrays, self._shared, raised)
 
@@ -76,7 +76,7 @@ class Renderer:
 
         Raises CompileError, OutOfMemory.
         """
-        self._own()
+        self._use_context()
         return Picture(self.context, self._kernels, self._uniform_buffer, scene, settings)
 
     def prior(self, color: np.ndarray, camera: np.void, depth: np.ndarray | None = None) -> Prior:
@@ -85,19 +85,19 @@ class Renderer:
 
         Raises OutOfMemory.
         """
-        self._own()
+        self._use_context()
         return Prior(self.context, self._kernels, color, camera, depth)
 
     @property
     def bsdf(self) -> BsdfEvaluator:
         """The evaluator of single materials' BSDFs."""
-        self._own()
+        self._use_context()
         return self._bsdf
 
     def tidy(self) -> float | None:
         """Release kernels and uploads that have not been used for long. Returns the seconds until the next call is
         due, or None."""
-        self._own()
+        self._use_context()
         before = self._shared.resting_bytes
         left = self._kernels.tidy(), self._shared.tidy()
         if self._shared.resting_bytes < before:
@@ -107,7 +107,7 @@ class Renderer:
     def let_go(self) -> None:
         """Give the memory of released scenes back to the machine, where the driver keeps what the last dispatch read.
         Raises CompileError, DeviceLost."""
-        self._own()
+        self._use_context()
         if self.info["software"]:
             dispatch_blank(self.context, self._kernels)
 
@@ -134,12 +134,12 @@ class Renderer:
     @property
     def reset_reason(self) -> str | None:
         """Why the device was reset since the renderer was made, in words; None where it was not."""
-        self._own()
+        self._use_context()
         return contexts.reset_reason(self.context)
 
     def close(self) -> None:
         """Release the context with all that was made from it."""
-        self._own()
+        self._use_context()
         self._kernels.release()
         self._shared.release()
         self._bsdf.release()

@@ -174,7 +174,7 @@ class FamilyRenderer(Renderer):
     ) -> Scene:
         if self.is_exact or everything:
             return super().load(arrays, editing, everything, raised)
-        self._own()
+        self._use_context()
         renderer._check(arrays)
         return FamilyScene(self.context, arrays, editing, self._shared, False, raised)
 

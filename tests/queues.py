@@ -9,6 +9,6 @@ LIMITS = QueueLimits(
     running=8,
     waiting=256,
     each=64,
-    retention=Retention(kept=64, kept_bytes=1 << 30, kept_s=3600.0),
+    retention=Retention(most_renders=64, most_bytes=1 << 30, longest_s=3600.0),
     disk_bytes=None,
 )

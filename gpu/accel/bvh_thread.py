@@ -71,8 +71,8 @@ def lay_treelets(
 
 @jit
 def _leaf(link: int, ranks: np.ndarray) -> int:
-    kept: int = (link & np.uint32(~LEAF_FIRST_MASK & 0xFFFFFFFF)) | ranks[link & np.uint32(LEAF_FIRST_MASK)]
-    return kept
+    moved: int = (link & np.uint32(~LEAF_FIRST_MASK & 0xFFFFFFFF)) | ranks[link & np.uint32(LEAF_FIRST_MASK)]
+    return moved
 
 
 @jit

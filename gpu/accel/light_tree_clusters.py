@@ -93,7 +93,7 @@ def _tabulate(share: np.ndarray, threshold: np.ndarray, alias: np.ndarray) -> No
 @jit
 def _fill(
     order: np.ndarray, intensity: np.ndarray, first: np.ndarray, count: np.ndarray, starts: np.ndarray,
-    totals: np.ndarray, own: np.ndarray, other: np.ndarray, threshold: np.ndarray,
+    totals: np.ndarray, light: np.ndarray, other: np.ndarray, threshold: np.ndarray,
 ) -> None:  # fmt: skip
     """Fill the tables and `totals`, the intensity of each pair. Entries of the pair i begin at starts[i]; -1: it has
     no table."""
@@ -110,7 +110,7 @@ def _fill(
         alias = np.empty(n, np.int64)
         _tabulate(share, threshold[table], alias)
         for j in range(n):
-            own[starts[i] + j], other[starts[i] + j] = mine[j], mine[alias[j]]
+            light[starts[i] + j], other[starts[i] + j] = mine[j], mine[alias[j]]
 
 
 def gather(
@@ -126,11 +126,11 @@ def gather(
     sizes = np.where(chosen, count, 0)
     starts = np.where(chosen, np.cumsum(sizes) - sizes, -1)
     entries = np.zeros(int(sizes.sum()), LightClusterEntry.dtype)
-    own, other = np.empty(len(entries), np.int64), np.empty(len(entries), np.int64)
+    light, other = np.empty(len(entries), np.int64), np.empty(len(entries), np.int64)
     threshold, totals = np.empty(len(entries), np.float64), np.zeros(pairs, np.float64)
     intensity = lights[:, INTENSITY].astype(np.float32).astype(np.float64)  # as in the shader
-    _fill(order, intensity, first, count, starts, totals, own, other, threshold)
-    entries["light"], entries["alias"], entries["threshold"] = own, other, threshold
+    _fill(order, intensity, first, count, starts, totals, light, other, threshold)
+    entries["light"], entries["alias"], entries["threshold"] = light, other, threshold
     clusters = np.zeros(pairs, LightCluster.dtype)
     clusters["first"][chosen], clusters["count"] = place + starts[chosen], sizes
     clusters["inverse_intensity"][chosen] = 1 / totals[chosen]

@@ -16,7 +16,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
-from gpu.bsdf import kernels as own
+from gpu.bsdf import kernels as bare_kernels
 from gpu.bsdf import lobes as single
 from gpu.device.tables import Tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
@@ -97,7 +97,7 @@ class BsdfEvaluator:
         model = models.BY_NUMBER[int(material.materials["model"][0])]
         alone, names = (model.lobes, model.lobe_names) if lobes else ((), ())
         found = []
-        work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
+        work = self._dispatch(material, bare_kernels.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
         try:
             work.give(np.concatenate([wo, wi]))
             work.make(Slot.OUTPUT, 16 * n * m)
@@ -141,7 +141,7 @@ class BsdfEvaluator:
         """The mean of the samples and their standard deviation, (n, 3) each; that of one sample is 0."""
         n, batches = len(wo), -(-samples // BATCH)
         sums = np.zeros((2, n, 3))
-        work = self._dispatch(material, own.ALBEDO, {"batches": batches, "batch": BATCH, "samples": samples})
+        work = self._dispatch(material, bare_kernels.ALBEDO, {"batches": batches, "batch": BATCH, "samples": samples})
         try:
             work.give(wo)
             work.make(Slot.OUTPUT, 32 * min(_MOST, n * batches))
@@ -166,7 +166,7 @@ class BsdfEvaluator:
 
         Raises CompileError, OutOfMemory.
         """
-        work = self._dispatch(material, own.TERMS, {})
+        work = self._dispatch(material, bare_kernels.TERMS, {})
         try:
             work.give(np.concatenate([wo, wi]))
             work.make(Slot.OUTPUT, 32 * len(wi))
@@ -182,9 +182,9 @@ class BsdfEvaluator:
 
     def _dispatch(self, material: SceneArrays, entry: str, uniforms: dict[str, int]) -> _Dispatch:
         contexts.use(self._context)
-        bare = own.bare(material)
+        bare = bare_kernels.bare(material)
         flags = features.evaluating(bare)
-        kernel = self._kernels.get(entry, own.defines(bare, flags, entry))
+        kernel = self._kernels.get(entry, bare_kernels.defines(bare, flags, entry))
         work = _Dispatch(self._context, self._kernels, kernel, self._tables.textures(flags), uniforms)
         try:
             work.upload(bare, flags)

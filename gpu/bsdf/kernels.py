@@ -37,8 +37,8 @@ def defines(arrays: SceneArrays, raised: frozenset[str], entry: str) -> dict[str
 
     `bsdf_albedo.comp` takes the independent sampler, so that the scatter of its samples gives their error.
     """
-    own: dict[str, dict[str, object]] = {ALBEDO: {"SAMPLER": 1}, VALUES: lobes.defines(), TERMS: {}}
-    return features.defines(raised, shapes=features.counts(arrays)) | own[entry]
+    specific: dict[str, dict[str, object]] = {ALBEDO: {"SAMPLER": 1}, VALUES: lobes.defines(), TERMS: {}}
+    return features.defines(raised, shapes=features.counts(arrays)) | specific[entry]
 
 
 def samples() -> Iterator[tuple[SceneArrays, frozenset[str]]]:

@@ -50,7 +50,7 @@ def _texture_bytes(texture: Any) -> int:
 
 
 T = TypeVar("T", bound=Upload)
-KEPT_S = 1.0  # for which an upload stays that nobody uses
+UNUSED_S = 1.0  # for which an upload stays that nobody uses
 
 
 @dataclass(frozen=True)
@@ -89,10 +89,10 @@ class UploadCache(Generic[T]):
     def tidy(self, now: float) -> float | None:
         """Release what has not been used for long. Returns the seconds until the next call is due, or None."""
         resting = {key: now - shared.left_at for key, shared in self._shared.items() if not shared.users}
-        for key in [key for key, age in resting.items() if age >= KEPT_S]:
+        for key in [key for key, age in resting.items() if age >= UNUSED_S]:
             self._shared.pop(key).upload.release()
             del resting[key]
-        return KEPT_S - max(resting.values()) if resting else None
+        return UNUSED_S - max(resting.values()) if resting else None
 
     def take(self, key: str, make: Callable[[], T]) -> Taken[T]:
         """The upload of that key; without a key, one that nobody else has. Raises what `make` raises."""

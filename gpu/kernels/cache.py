@@ -30,7 +30,7 @@ _Key = tuple[str, tuple[tuple[str, object], ...]]
 
 
 @dataclass
-class _Kept:
+class _Cached:
     kernel: Any
     used_at: float = 0.0  # by the monotonic clock
     holders: int = 0
@@ -47,7 +47,7 @@ class KernelCache:
         self._folders = folders
         self._binaries = ProgramBinaries(context)
         self._most, self._longest_s = most, longest_s
-        self._cache: dict[_Key, _Kept] = {}
+        self._cache: dict[_Key, _Cached] = {}
         self.last_compile_ms = 0.0
         self.evicted = 0
 
@@ -62,19 +62,19 @@ class KernelCache:
         if key not in self._cache:
             kernel = self._compile(entry, defines)
             self._evict(len(self._free) + 1 - self._most)
-            self._cache[key] = _Kept(kernel)
-        kept = self._cache[key]
-        kept.used_at = time.monotonic()
-        return kept.kernel
+            self._cache[key] = _Cached(kernel)
+        cached = self._cache[key]
+        cached.used_at = time.monotonic()
+        return cached.kernel
 
     def hold(self, kernel: Any) -> None:
         """Protect the kernel from eviction, until as many calls of `let_go`."""
         self._of(kernel).holders += 1
 
     def let_go(self, kernel: Any) -> None:
-        kept = self._of(kernel)
-        kept.holders -= 1
-        kept.used_at = time.monotonic()
+        cached = self._of(kernel)
+        cached.holders -= 1
+        cached.used_at = time.monotonic()
         self._evict(len(self._free) - self._most)
 
     def tidy(self) -> float | None:
@@ -90,11 +90,11 @@ class KernelCache:
     @property
     def _free(self) -> list[_Key]:
         """The kernels that no picture holds, the longest unused first."""
-        free = [key for key, kept in self._cache.items() if not kept.holders]
+        free = [key for key, cached in self._cache.items() if not cached.holders]
         return sorted(free, key=lambda key: self._cache[key].used_at)
 
-    def _of(self, kernel: Any) -> _Kept:
-        return next(kept for kept in self._cache.values() if kept.kernel is kernel)
+    def _of(self, kernel: Any) -> _Cached:
+        return next(cached for cached in self._cache.values() if cached.kernel is kernel)
 
     def _evict(self, count: int) -> None:
         for key in self._free[: max(0, count)]:
@@ -121,8 +121,8 @@ class KernelCache:
 
     def release(self) -> None:
         contexts.use(self._context)  # another one has programs of the same numbers
-        for kept in self._cache.values():
-            kept.kernel.release()
+        for cached in self._cache.values():
+            cached.kernel.release()
         self._cache.clear()
 
 

@@ -85,7 +85,7 @@ class _Assembly:
 
 
 @cache
-def _own(entry: str) -> _Assembled:
+def _packaged(entry: str) -> _Assembled:
     """The entry as this package has it. To assemble it takes 6 ms, and the key of every kernel is its text."""
     return _Assembly((SHADERS,)).make(entry)
 
@@ -94,7 +94,7 @@ class KernelSource:
     """One kernel's text, with every include in place once, and the names of the files its lines came from."""
 
     def __init__(self, entry: str, defines: Mapping[str, object], folders: Sequence[Path] = (SHADERS,)) -> None:
-        assembled = _own(entry) if tuple(folders) == (SHADERS,) else _Assembly(folders).make(entry)
+        assembled = _packaged(entry) if tuple(folders) == (SHADERS,) else _Assembly(folders).make(entry)
         for word in assembled.asked.keys() - defines.keys():  # Mesa takes such a name for 0 without a warning
             name, at = assembled.asked[word]
             raise CompileError(f"{name}:{at}: #if asks for {word}, which nothing defines")

@@ -63,7 +63,7 @@ class Adaptive:
     def forget(self) -> None:
         self._plan = None
 
-    def _kept(self) -> SamplePlan:
+    def _read_plan(self) -> SamplePlan:
         if self._plan is None:
             words = np.frombuffer(self._words.read(), WORDS).reshape(self._pixels.shape[:2])
             decided = bool((words["weights"] > 0).all())
@@ -103,7 +103,7 @@ class Adaptive:
 
     def begin(self, before: int, after: int, most: int) -> None:
         """List the areas of a pass from `before` mean samples to `after`; an invocation takes at most `most`."""
-        plan = self._kept()
+        plan = self._read_plan()
         wanted = plan.at(after)
         self._counts.write(wanted.tobytes())
         # A plan that was just made anew may start some pixels at samples that they do not have.

@@ -46,11 +46,11 @@ class Sharing:
 
     def __init__(self, first: int, end: int, rows: int) -> None:
         self.first, self.end, self.rows = first, end, rows
-        self.own = BandTracer(Band(first, end - first, 0, rows)) if rows else None
+        self.tracer = BandTracer(Band(first, end - first, 0, rows)) if rows else None
 
     @property
     def own_done(self) -> bool:
-        return self.own is None or self.own.complete
+        return self.tracer is None or self.tracer.complete
 
     def check(self, band: Band) -> None:
         """Raises ValueError for a band that is not of this block, or has the picture's own rows."""

@@ -41,8 +41,8 @@ _LUMINANCE = np.array(LUMINANCE)
 
 def defines(weigh: int = 0, variance: int = 0) -> dict[str, object]:
     """The defines that meter.comp is compiled with."""
-    own = {"METER_WEIGH": weigh, "METER_VARIANCE": variance, "METER_LINE": LINE}
-    return features.defines(frozenset()) | own
+    defines = {"METER_WEIGH": weigh, "METER_VARIANCE": variance, "METER_LINE": LINE}
+    return features.defines(frozenset()) | defines
 
 
 class NoiseMeter:

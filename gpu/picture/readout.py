@@ -114,15 +114,15 @@ class Readout:
         self, look: Look, dtype: str, color: np.ndarray | None, prior: Prior | None, samples: int
     ) -> np.ndarray:
         """Colour as `Picture.display` gives it, of a picture with that many samples."""
-        d, own = self._dispatcher, dict[Slot, Any]()
+        d, buffers = self._dispatcher, dict[Slot, Any]()
         guess = {} if prior is None else prior.guess
         bind_sums: Callable[[Any, int, int], None] = self._sums.bind
         caustics = color is None and samples > 0 and self._light.on
         if color is not None:
             weight = samples if guess else 1
             given = {Slot.SUM: color * np.float32(weight), Slot.MOMENTS: np.full_like(color, weight)}
-            own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
-            bind_sums = partial(self._sums.bind_alone, own)
+            buffers = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
+            bind_sums = partial(self._sums.bind_alone, buffers)
         elif samples == 0:
             bind_sums, guess = partial(self._sums.bind_alone, guess), {}
 
@@ -134,7 +134,7 @@ class Readout:
 
         count = self._size[0] * self._size[1]
         pixels = resolve(d.context, self._kernels, d.scene.looks, bind, count, d.most_pixels, look, dtype, caustics)
-        for buffer in own.values():
+        for buffer in buffers.values():
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)
 

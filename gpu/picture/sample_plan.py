@@ -46,14 +46,14 @@ def weights_of(variances: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     out = np.ones(pixels.shape)
     if not np.isfinite(variances).all():  # beyond float32: it is unknown which areas err more
         return out.astype(np.float32)
-    for own in range(CLASSES):
-        seen = (own + 1) % CLASSES
+    for kind in range(CLASSES):
+        seen = (kind + 1) % CLASSES
         sums, members = _spread(variances[..., seen]), _spread(pixels[..., seen].astype(float))
         weights = np.divide(sums, members, out=np.zeros_like(sums), where=members > 0) ** _EXPONENT
-        mine = pixels[..., own]
+        mine = pixels[..., kind]
         mean = (weights * mine).sum() / max(mine.sum(), 1)
         if mean > 0:
-            out[..., own] = np.clip(weights / mean, LEAST, MOST)
+            out[..., kind] = np.clip(weights / mean, LEAST, MOST)
     return out.astype(np.float32)
 
 
@@ -76,11 +76,11 @@ class SamplePlan:
         self.weights = np.ones(pixels.shape, np.float32) if weights is None else weights
         self._classes = [self._cumulated(k) for k in range(CLASSES)]
 
-    def _cumulated(self, own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _cumulated(self, kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """For a class, in the order in which its areas begin to get samples: the level at which each begins, then the
         samples of all areas that have not begun, and the weight of those that have."""
-        members, weights = self._pixels[..., own].ravel(), self.weights[..., own].ravel().astype(float)
-        counts = self.counts[..., own].ravel().astype(float)
+        members, weights = self._pixels[..., kind].ravel(), self.weights[..., kind].ravel().astype(float)
+        counts = self.counts[..., kind].ravel().astype(float)
         levels = counts / weights
         order = np.argsort(levels, kind="stable")
         begun = np.cumsum((members * weights)[order])
@@ -90,11 +90,11 @@ class SamplePlan:
     def at(self, samples: int) -> np.ndarray:
         """(rows, columns, CLASSES) uint32: each pixel's samples where their mean is `samples`. Rises with it."""
         out = self.counts.copy()
-        for own, (levels, resting, begun) in enumerate(self._classes):
-            wanted = float(samples) * self._pixels[..., own].sum()
+        for kind, (levels, resting, begun) in enumerate(self._classes):
+            wanted = float(samples) * self._pixels[..., kind].sum()
             k = int(np.searchsorted(resting + begun * levels, wanted, side="right")) - 1
             if k >= 0 and begun[k] > 0:
                 level = (wanted - resting[k]) / begun[k]
-                share = np.floor(level * self.weights[..., own].astype(float) + 0.5)
-                out[..., own] = np.maximum(out[..., own], np.minimum(share, _COUNTED).astype(np.uint32))
+                share = np.floor(level * self.weights[..., kind].astype(float) + 0.5)
+                out[..., kind] = np.maximum(out[..., kind], np.minimum(share, _COUNTED).astype(np.uint32))
         return out

@@ -62,8 +62,8 @@ class SharedBlock:
     def trace_own(self, budget_s: float) -> float:
         """Trace the picture's own rows of the shared block for about `budget_s` seconds. Returns the seconds that it
         took."""
-        own = None if self._sharing is None else self._sharing.own
-        return 0.0 if own is None else self._passes.trace_band(own, budget_s)
+        tracer = None if self._sharing is None else self._sharing.tracer
+        return 0.0 if tracer is None else self._passes.trace_band(tracer, budget_s)
 
     def complete(self) -> None:
         """Take the shared block as the picture's: all rows have their samples. `Picture.trace` then traces the noise

@@ -47,7 +47,7 @@ class KernelKey:
         """True if its code goes into our own cache, where the device is a GPU."""
         return self.entry in ENTRIES
 
-    def is_kept(self, info: Mapping[str, Any]) -> bool:
+    def is_cached(self, info: Mapping[str, Any]) -> bool:
         """True if its code is in there, for the driver that `info` (`Renderer.info`) names."""
         return self.is_ours and binary_file(info, self.text).exists()
 

@@ -40,11 +40,11 @@ class Precompiler:
         Raises CompileError."""
         began = time.perf_counter()
         if self._binaries.able and wanted.entry in ENTRIES:
-            kept = self._binaries.has(wanted.text)
-            if not kept:
+            cached = self._binaries.has(wanted.text)
+            if not cached:
                 self._once(wanted)
-                kept = self._binaries.has(wanted.text)
-            return (time.perf_counter() - began) * 1e3, kept
+                cached = self._binaries.has(wanted.text)
+            return (time.perf_counter() - began) * 1e3, cached
         first_s = self._once(wanted)
         milliseconds = (time.perf_counter() - began) * 1e3
         if first_s < _QUICK_S or self._is_faster(wanted, first_s):

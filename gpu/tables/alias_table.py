@@ -39,8 +39,8 @@ def alias_table(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
         threshold[heavy[:-1]] = np.clip(1.0 + spare[:-1] - need[taker], 0.0, 1.0)
         alias[heavy[:-1]] = heavy[1:]
     rounded = threshold.astype(np.float32)
-    kept = rounded.astype(np.float64)
-    return rounded, alias, (kept + np.bincount(alias, 1.0 - kept, n)) / n
+    stays = rounded.astype(np.float64)
+    return rounded, alias, (stays + np.bincount(alias, 1.0 - stays, n)) / n
 
 
 def _footprint(values: np.ndarray) -> np.ndarray:

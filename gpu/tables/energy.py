@@ -99,8 +99,8 @@ def _summed(table: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=1)
 def tables() -> Tables:
     """The tables in the package."""
-    with np.load(FILE) as kept:
-        found = {n: _summed(v) if n == "stretched" else v for n, v in kept.items()}
+    with np.load(FILE) as stored:
+        found = {n: _summed(v) if n == "stretched" else v for n, v in stored.items()}
     found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in found.items()}
     # The albedo with Fresnel 1 is the same for every index and is stored once.
     one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)

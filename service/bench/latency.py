@@ -49,12 +49,12 @@ def measure() -> dict[str, float]:
     }
 
 
-def rooms(told: Callable[[str], None]) -> dict[str, dict[str, float]]:
+def rooms(progress: Callable[[str], None]) -> dict[str, dict[str, float]]:
     """The same, by built-in scene: `slider_p50_ms`, `slider_p95_ms`, and those of the `camera`."""
     out: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, server(folder) as (port, _):
         for entry in presets.names("scenes"):
-            told(f"first frames of {entry['name']}")
+            progress(f"first frames of {entry['name']}")
             with open_stream(port) as stream:
                 editor = Editor(port, stream, entry["name"])
                 editor.start(0.0)
@@ -77,13 +77,13 @@ def server(folder: str, **variables: str) -> Iterator[tuple[int, float]]:
     environment |= {"SUNBOX_DATA_DIR": folder, **machine.shader_caches(folder), **variables}
     began = time.perf_counter()
     command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port)]
-    told = Path(folder, "server.log")
-    with told.open("wb") as log:
+    log_file = Path(folder, "server.log")
+    with log_file.open("wb") as log:
         server = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     try:
         while not listens(port):
             if server.poll() is not None:
-                raise RuntimeError(f"the server ended instead of starting: {told.read_text()[-500:]}")
+                raise RuntimeError(f"the server ended instead of starting: {log_file.read_text()[-500:]}")
             time.sleep(0.01)
         yield port, began
     finally:
@@ -166,9 +166,9 @@ class Editor:
         """The generation of the next frame, acknowledged; None for other messages."""
         message = self._stream.recv(timeout)
         if isinstance(message, str):
-            told = json.loads(message)
-            if told["type"] == "error":
-                raise RuntimeError(f"the server refused the benchmark's own message: {told['problem']}")
+            answer = json.loads(message)
+            if answer["type"] == "error":
+                raise RuntimeError(f"the server refused the benchmark's own message: {answer['problem']}")
             return None
         header = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
         self._stream.send(json.dumps({"type": "ack", "seq": header["seq"]}))

@@ -35,21 +35,21 @@ class Options:
     environment_file: Path | None = None
 
 
-def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
-    """The machine, a row for each case, latencies; `told` is called with the name of each measurement."""
+def measure(options: Options, progress: Callable[[str], None]) -> dict[str, Any]:
+    """The machine, a row for each case, latencies; `progress` is called with the name of each measurement."""
     rows = []
     for case in cases():
-        told(f"{case.name}, {case.max_bounces} bounces")
+        progress(f"{case.name}, {case.max_bounces} bounces")
         rows.append(_in_fresh_processes(case, options))
-    grown = growth(told)
-    told("server start and slider moves")
+    grown = growth(progress)
+    progress("server start and slider moves")
     return {
         "machine": machine.describe(rows[0]["renderer"]),
         "size": [SIZE, SIZE],
         "scenes": [{key: value for key, value in row.items() if key != "renderer"} for row in rows],
         "growth": grown,
         "latency": latency.measure(),
-        "rooms": latency.rooms(told),
+        "rooms": latency.rooms(progress),
     }
 
 
@@ -116,9 +116,9 @@ GROWTH_BOUNCES, GROWTH_RUNS = 4, 3
 BUMPS = 9  # bumps around the ball, about
 
 
-def growth(told: Callable[[str], None], levels: range = GROWTH_LEVELS) -> list[dict[str, float]]:
+def growth(progress: Callable[[str], None], levels: range = GROWTH_LEVELS) -> list[dict[str, float]]:
     """A row for each level: triangles, the time to build the tree, milliseconds for a sample of every pixel."""
-    return [_growth_row(ball(level), told) for level in levels]
+    return [_growth_row(ball(level), progress) for level in levels]
 
 
 def ball(level: int) -> MeshData:
@@ -139,8 +139,8 @@ class _One(BenchAssets):
         return self._one
 
 
-def _growth_row(mesh: MeshData, told: Callable[[str], None]) -> dict[str, float]:
-    told(f"{len(mesh.faces)} triangles")
+def _growth_row(mesh: MeshData, progress: Callable[[str], None]) -> dict[str, float]:
+    progress(f"{len(mesh.faces)} triangles")
     corners = mesh.vertices[mesh.faces].astype(np.float32)
     kinds = np.full(len(corners), int(ShapeKind.TRIANGLE), np.uint8)
     seconds = []

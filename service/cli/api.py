@@ -68,18 +68,22 @@ if end_with(int(sys.argv[1])):
 
 
 @contextmanager
-def server_or_own(url: str | None) -> Iterator[Client]:
+def server_or_local(url: str | None) -> Iterator[Client]:
     """The server at an address, or without one a server that renders here and stores nothing. Raises as `server`."""
     if url is not None:
         with server(url) as client:
             yield client
         return
-    with tempfile.TemporaryDirectory(prefix="sunbox-") as folder, _own(Path(folder)) as own, server(own) as client:
+    with (
+        tempfile.TemporaryDirectory(prefix="sunbox-") as folder,
+        _local_server(Path(folder)) as address,
+        server(address) as client,
+    ):
         yield client
 
 
 @contextmanager
-def _own(folder: Path) -> Iterator[str]:
+def _local_server(folder: Path) -> Iterator[str]:
     """The address of a server whose data lie in a folder. Ctrl-C is for this process, which ends the server then."""
     environment = {**os.environ, "SUNBOX_DATA_DIR": str(folder / "data"), "SUNBOX_HOST": "127.0.0.1"}
     command = [sys.executable, "-P", "-c", PROGRAM, str(os.getpid())]

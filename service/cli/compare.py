@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from service.cli import BadInput, Failed, comparing, files
-from service.cli.api import server_or_own
+from service.cli.api import server_or_local
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     a, b = (comparing.read_input(name, arguments, config) for name in (arguments.a, arguments.b))
     settings = comparing.chosen(a, b, arguments, config)
     try:
-        with server_or_own(arguments.server) as client:
+        with server_or_local(arguments.server) as client:
             found = comparing.verdict(client, a, b, settings, arguments)
         if output is not None and found.map is not None:
             files.write(output, found.map)

@@ -61,7 +61,7 @@ def chosen(a: Input, b: Input, arguments: argparse.Namespace, config: Config) ->
 
     texts = arguments.set or []
     base = [each.settings or other.settings for each, other in ((a, b), (b, a))]
-    return [read_settings(texts, config, own).model_dump(mode="json", exclude_unset=True) for own in base]
+    return [read_settings(texts, config, given).model_dump(mode="json", exclude_unset=True) for given in base]
 
 
 def verdict(
@@ -70,12 +70,12 @@ def verdict(
     """With the map that the arguments ask for, if there is one."""
     from service.cli.documents import with_uploads
 
-    def side(one: Input, own: dict[str, Any]) -> Any:
+    def side(one: Input, given: dict[str, Any]) -> Any:
         if one.picture is not None:
             return client.upload(one.picture)
         if one.source is None:
             return one.name
-        return {"scene": with_uploads(client, one.source, arguments.asset_root), "settings": own}
+        return {"scene": with_uploads(client, one.source, arguments.asset_root), "settings": given}
 
     map = arguments.map if arguments.output is not None else None
     return client.compare(side(a, settings[0]), side(b, settings[1]), arguments.confidence, map)

@@ -53,9 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
             document = {name: document[name] for name in ("materials", "textures")}
         if (aspect := model.aspect_ratio) not in (None, 1):
             size = picture_size(read_settings([], config), aspect)
-            told = f"--set width={size['width']} --set height={size['height']}"
+            options = f"--set width={size['width']} --set height={size['height']}"
             print(
-                f"note: the camera's picture is {aspect:.3g} times as wide as high: {told} renders it",
+                f"note: the camera's picture is {aspect:.3g} times as wide as high: {options} renders it",
                 file=sys.stderr,
             )
         builtin = presets.builtin_assets().keys()
@@ -81,5 +81,5 @@ def _tell_choices(model: Imported, pose: Pose) -> None:
     if model.variants and pose.variant is None:
         print(f"note: --variant NAME takes another variant: {', '.join(model.variants)}", file=sys.stderr)
     if model.animations and pose.animation is None:
-        told = ", ".join(f"{each['name']} ({each['duration']:.3g} s)" for each in model.animations)
-        print(f"note: --animation NAME --time S poses the model: {told}", file=sys.stderr)
+        names = ", ".join(f"{each['name']} ({each['duration']:.3g} s)" for each in model.animations)
+        print(f"note: --animation NAME --time S poses the model: {names}", file=sys.stderr)

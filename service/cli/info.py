@@ -64,8 +64,8 @@ def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
 
 
 def _triangles(packed: Packed) -> str:
-    held, shown = len(packed.arrays.triangles), len(packed.arrays.instances)
-    return f"{held}, shared by {shown} instances" if shown else str(held)
+    stored, shown = len(packed.arrays.triangles), len(packed.arrays.instances)
+    return f"{stored}, shared by {shown} instances" if shown else str(stored)
 
 
 def kernel(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]:
@@ -78,10 +78,10 @@ def measured(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str
     now."""
     print("compiling and measuring; the kernel for many scenes may take minutes", file=sys.stderr)
     price = renderer.kernel_cost(packed.arrays)
-    own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
+    specific, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("not needed", " ".join(price.spared)),
-        ("its kernel", f"compiled in {price.compile_ms:.0f} ms, {own} at 8 bounces"),
+        ("its kernel", f"compiled in {price.compile_ms:.0f} ms, {specific} at 8 bounces"),
         ("that for many", f"compiled in {price.full_compile_ms:.0f} ms, {full}: {price.saving:.0%} is saved"),
     ]
 

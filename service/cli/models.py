@@ -115,9 +115,9 @@ def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
     # A path may lead out of the folder where --asset-root allows that: in the zip the model lies as deep.
     deep = max((name.split("/").count("..") for name in found), default=0)
     folder = "/".join(["model"] * deep)
-    own = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
+    member = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
     entries = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in found.items()}
-    return zipped(entries | {posixpath.join(folder, own): data})
+    return zipped(entries | {posixpath.join(folder, member): data})
 
 
 def _with_images(path: Path, data: bytes, files: FileAssets) -> bytes:
@@ -131,8 +131,8 @@ def _with_images(path: Path, data: bytes, files: FileAssets) -> bytes:
     deep = max((name.split("/").count("..") for name in entries), default=0)
     folder = "/".join(["model"] * deep)
     named = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in entries.items()}
-    own = (path.name if path.suffix.lower() == ".mtlx" else f"{path.name}.mtlx").replace("\\", "_")
-    return zipped(named | {posixpath.join(folder, own): data})
+    member = (path.name if path.suffix.lower() == ".mtlx" else f"{path.name}.mtlx").replace("\\", "_")
+    return zipped(named | {posixpath.join(folder, member): data})
 
 
 def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.cli import BadInput, Failed, files
-from service.cli.api import server_or_own
+from service.cli.api import server_or_local
 
 if TYPE_CHECKING:
     from sunbox import Batch
@@ -71,7 +71,7 @@ def batch_file(
     config = configuration()
     source = read_source(Path(arguments.input), arguments.asset_root, config)
     settings = read_settings(arguments.set or [], config, source.settings).model_dump(mode="json", exclude_unset=True)
-    with server_or_own(arguments.server) as client:
+    with server_or_local(arguments.server) as client:
         scene = with_uploads(client, source, arguments.asset_root)
         batch = client.batch(scene, over, **settings)
         try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from service.cli import BadInput, Failed, comparing, files
-from service.cli.api import lines_of, server_or_own
+from service.cli.api import lines_of, server_or_local
 from service.cli.comparing import Input
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     rows: dict[str, list[Image.Image]] = {}
     error = None
     try:
-        with server_or_own(arguments.server) as client:
+        with server_or_local(arguments.server) as client:
             for case in cases:
                 _compare(client, case, arguments)
                 if (
@@ -141,8 +141,8 @@ def _pictures(client: Client, case: Case, arguments: argparse.Namespace) -> list
     assert sides is not None and found.map is not None
     samples = found.samples["a"], found.samples["b"]
     shown = [
-        comparing.displayed(client, one, {**own, "max_samples": count}, arguments)
-        for one, own, count in zip(sides, case.settings, samples, strict=True)
+        comparing.displayed(client, one, {**given, "max_samples": count}, arguments)
+        for one, given, count in zip(sides, case.settings, samples, strict=True)
     ]
     return [_small(Image.open(io.BytesIO(data)).convert("RGB")) for data in (*shown, found.map)]
 

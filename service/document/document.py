@@ -89,17 +89,17 @@ def parse_scene(
     both scenes, and are not validated again.
     """
     fields = document if isinstance(document, dict) else {}
-    held = {name: fields[name] for name, kind in _KINDS.items() if isinstance(fields.get(name), kind)}
-    errors = too_many(held, limits)
+    tables = {name: fields[name] for name, kind in _KINDS.items() if isinstance(fields.get(name), kind)}
+    errors = too_many(tables, limits)
     if errors:  # its entries are not validated
         raise InvalidDocument(errors).under(pointer)
     # The scene's entries are validated one by one, and the rest of the scene without them.
-    head = {**document, **{name: type(entries)() for name, entries in held.items()}} if held else document
+    head = {**document, **{name: type(entries)() for name, entries in tables.items()}} if tables else document
     try:
         scene = Scene.model_validate(head)
     except ValidationError as error:
         errors = mistakes(error, Scene)
-    parts = {name: _part(name, entries, before, errors) for name, entries in held.items()}
+    parts = {name: _part(name, entries, before, errors) for name, entries in tables.items()}
     errors.sort(key=_place)
     errors += islice(_dangling(document), MOST_MISTAKES)
     if errors:
@@ -111,13 +111,13 @@ def parse_scene(
     return scene
 
 
-def too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
+def too_many(tables: dict[str, Any], limits: Limits | None) -> list[FieldError]:
     """Errors for lists and tables of a scene, by name, that have more entries than the limits allow."""
-    most = {name: getattr(limits, f"max_{name}") for name in held} if limits is not None else {}
+    most = {name: getattr(limits, f"max_{name}") for name in tables} if limits is not None else {}
     return [
-        FieldError(f"/{name}", f"has {len(held[name])} entries: at most {most[name]} (SUNBOX_MAX_{name.upper()})")
+        FieldError(f"/{name}", f"has {len(tables[name])} entries: at most {most[name]} (SUNBOX_MAX_{name.upper()})")
         for name in most
-        if len(held[name]) > most[name]
+        if len(tables[name]) > most[name]
     ]
 
 

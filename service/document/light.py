@@ -84,8 +84,8 @@ class SpotLight(_Light):
     @model_validator(mode="after")
     def _fades_outwards(self) -> Self:
         if self.inner_angle > self.outer_angle:
-            told = f"must be at most outer_angle, which is {self.outer_angle!r}, not {self.inner_angle!r}"
-            raise refusal(told, at="/inner_angle")
+            detail = f"must be at most outer_angle, which is {self.outer_angle!r}, not {self.inner_angle!r}"
+            raise refusal(detail, at="/inner_angle")
         if isinstance(self.intensity, Flux):
             inner, outer = (math.cos(math.radians(angle)) for angle in (self.inner_angle, self.outer_angle))
             # Between the two cosines it fades along a curve that is symmetric about its middle.

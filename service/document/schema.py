@@ -111,6 +111,6 @@ def _type(definition: Schema) -> str | None:
 
 def _references(node: Any) -> list[str]:
     if isinstance(node, dict):
-        own = [node["$ref"].rpartition("/")[2]] if isinstance(node.get("$ref"), str) else []
-        return own + [ref for value in node.values() for ref in _references(value)]
+        direct = [node["$ref"].rpartition("/")[2]] if isinstance(node.get("$ref"), str) else []
+        return direct + [ref for value in node.values() for ref in _references(value)]
     return [ref for value in node for ref in _references(value)] if isinstance(node, list) else []

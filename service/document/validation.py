@@ -82,8 +82,8 @@ def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
         found.setdefault(pointer + entry.get("ctx", {}).get("at", ""), (entry, place))
     # Errors of `type` come first: under a wrong type every other field may look wrong.
     holders = {pointer.removesuffix("type") for pointer in kinds}
-    kept = (pointer for pointer in found if pointer in kinds or not _is_below(pointer, holders))
-    return [FieldError(pointer, _detail(*found[pointer])) for pointer in islice(kept, MOST_MISTAKES)]
+    outer = (pointer for pointer in found if pointer in kinds or not _is_below(pointer, holders))
+    return [FieldError(pointer, _detail(*found[pointer])) for pointer in islice(outer, MOST_MISTAKES)]
 
 
 def among(names: Iterable[str]) -> str:

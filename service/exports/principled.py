@@ -22,15 +22,17 @@ MATTE = {"roughness": 1.0, "specular": 0.0}
 MOST_SPECULAR = 0.08  # reflectance head-on that `specular` 1 stands for
 
 
-def as_principled(material: Material, pointer: str, losses: Losses, kept: Collection[str] = ()) -> PrincipledMaterial:
-    """The material as one of `principled`. What that loses is added to `losses`, but for the parameters `kept` of the
-    material itself that the format has; `pointer` leads to the material."""
+def as_principled(
+    material: Material, pointer: str, losses: Losses, written: Collection[str] = ()
+) -> PrincipledMaterial:
+    """The material as one of `principled`. What that loses is added to `losses`, but for the parameters `written` of
+    the material itself that the format has; `pointer` leads to the material."""
     if isinstance(material, PrincipledMaterial):
         return material
     document = material.model_dump(exclude_unset=True)
     found = converted(document, type(material), PrincipledMaterial)
     made = found.material | _highlight(material)
-    lost = [name for name in found.lost if name not in ("type", *kept, *_READ.get(material.type, ()))]
+    lost = [name for name in found.lost if name not in ("type", *written, *_READ.get(material.type, ()))]
     losses.add(f"{pointer}/type", _HOW.get(material.type, f"{material.type} is written as principled"))
     for name in lost:
         losses.add(f"{pointer}/{name}", f"{material.type} alone has it")

@@ -51,16 +51,16 @@ def encode(message: object, sealed: bool = False) -> Encoded:
     spilled = len(body) > INLINE
     if spilled:
         parts.append(memoryview(body))
-    places, own, blocks = _places(parts)
+    places, copied, blocks = _places(parts)
     datagram = pickle.dumps((b"" if spilled else body, places))
-    held = [os.dup(block.descriptor) for block in blocks]
-    if own:
+    descriptors = [os.dup(block.descriptor) for block in blocks]
+    if copied:
         try:
-            held.append(_shared(own, sealed))
+            descriptors.append(_shared(copied, sealed))
         except BaseException:
-            discard((datagram, tuple(held)))
+            discard((datagram, tuple(descriptors)))
             raise
-    return datagram, tuple(held)
+    return datagram, tuple(descriptors)
 
 
 def decode(datagram: bytes, descriptors: tuple[int, ...], find: FindClass | None = None) -> Any:
@@ -167,7 +167,7 @@ def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], lis
     for known in found:
         if known is not None and len(blocks) < MOST - 1 and all(known[0] is not block for block in blocks):
             blocks.append(known[0])
-    places, own, end = list[Place](), list[memoryview](), 0
+    places, copied, end = list[Place](), list[memoryview](), 0
     for part, known in zip(parts, found, strict=True):
         which = next((i for i, block in enumerate(blocks) if known is not None and known[0] is block), None)
         if known is not None and which is not None:
@@ -175,9 +175,9 @@ def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], lis
         else:
             places.append((len(blocks), end, part.nbytes))
             if part.nbytes:
-                own.append(part)
+                copied.append(part)
             end += -(-part.nbytes // ALIGNMENT) * ALIGNMENT
-    return places, own, blocks
+    return places, copied, blocks
 
 
 def _shared(parts: list[memoryview], sealed: bool) -> int:

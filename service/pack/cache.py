@@ -89,7 +89,7 @@ class PackCache:
         self.bytes = 0
         self._entries = entries
         self._budget = budget or CacheBudget()
-        self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
         self.moves = MovedMeshes()
         self._budget.join(self)  # last: from now on other threads shrink it
@@ -97,37 +97,37 @@ class PackCache:
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The part of an equal key, or else `make()`, which runs outside the lock."""
         with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                value: T = self._kept[key][0]
+            if key in self._values:
+                self._values.move_to_end(key)
+                value: T = self._values[key][0]
                 return value
         value = make()
         with self._lock:
-            replaced = self._kept.pop(key, (None, 0))[1]
-            self._kept[key] = value, _freeze(value)
-            self.bytes += self._kept[key][1] - replaced
-            while len(self._kept) > 1 and (len(self._kept) > self._entries or self._budget.exceeded):
-                self.bytes -= self._kept.popitem(last=False)[1][1]
+            replaced = self._values.pop(key, (None, 0))[1]
+            self._values[key] = value, _freeze(value)
+            self.bytes += self._values[key][1] - replaced
+            while len(self._values) > 1 and (len(self._values) > self._entries or self._budget.exceeded):
+                self.bytes -= self._values.popitem(last=False)[1][1]
         return value
 
     def find(self, key: Hashable) -> Any:
         """The part of an equal key, or None."""
         with self._lock:
-            return self._kept.get(key, (None, 0))[0]
+            return self._values.get(key, (None, 0))[0]
 
     def drop_oldest(self) -> int:
         """Drop the least recently used part, unless it is the only one. Returns its bytes."""
         with self._lock:
-            if len(self._kept) < 2:
+            if len(self._values) < 2:
                 return 0
-            size = self._kept.popitem(last=False)[1][1]
+            size = self._values.popitem(last=False)[1][1]
             self.bytes -= size
             return size
 
     def gather(self, kind: type[T]) -> list[T]:
         """All parts of that kind, the newest last."""
         with self._lock:
-            return [value for value, _ in self._kept.values() if isinstance(value, kind)]
+            return [value for value, _ in self._values.values() if isinstance(value, kind)]
 
 
 def _freeze(value: object) -> int:

@@ -59,8 +59,8 @@ def pack_measured(
     else:
         packed = cache.get(("measured", key), lambda: PackedMeasured(_words(count, wanted, found), key))
     names = list(drawn.materials)
-    told = {asset: names[i] for i, asset in reversed(wanted.items())}
-    said = (f"/materials/{escaped(told[a])}/asset: {each}" for a, data in found.items() for each in data.warnings)
+    wearer = {asset: names[i] for i, asset in reversed(wanted.items())}
+    said = (f"/materials/{escaped(wearer[a])}/asset: {each}" for a, data in found.items() for each in data.warnings)
     return PackedMeasured(packed.words, key, tuple(said))
 
 

@@ -30,7 +30,7 @@ from service.ipc.task_control import ApplyNow, Pause, Resume, Stop
 from service.renderers.working_states import WorkingStates
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
-Kept = Restore | Callable[[], Restore]
+StoredPicture = Restore | Callable[[], Restore]
 
 
 @dataclass
@@ -49,8 +49,8 @@ class ReplayLog:
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
         self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
-        self.saved: Kept | None = None  # a finished picture
-        self._checkpoint: Kept | None = None  # one under way
+        self.saved: StoredPicture | None = None  # a finished picture
+        self._checkpoint: StoredPicture | None = None  # one under way
         self._driver = ""
         self._task = task
         self._states = WorkingStates[_State](lambda state: channel.discard(state.scene))
@@ -60,7 +60,7 @@ class ReplayLog:
         self._stopped_at: Done | None = None
 
     @property
-    def kept(self) -> Kept | None:
+    def stored_picture(self) -> StoredPicture | None:
         """The picture as the server keeps it, if it does."""
         return self.saved or self._checkpoint
 
@@ -85,7 +85,7 @@ class ReplayLog:
         """The picture under way that the server keeps can't be read: the render begins again."""
         self._checkpoint = None
 
-    def scene_told(self, update: Update, encoded: Encoded) -> None:
+    def note_scene(self, update: Update, encoded: Encoded) -> None:
         self._push(update.generation, _State(channel.another(encoded), whole=True))
 
     def restored(self, restore: Restore) -> None:
@@ -95,7 +95,7 @@ class ReplayLog:
         else:
             self.saved = restore
 
-    def told(self, message: ToRenderer) -> None:
+    def note(self, message: ToRenderer) -> None:
         if isinstance(message, Update):
             self._edited(message)
         elif isinstance(message, Want):
@@ -139,11 +139,11 @@ class ReplayLog:
                 out.append(state.since)
         return out
 
-    def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
-        """Messages for a new renderer, in order; the caller owns the descriptors of encoded ones. `kept`: encoded."""
+    def again(self, picture: Encoded | None = None) -> list[Encoded | ToRenderer]:
+        """Messages for a new renderer, in order; the caller owns the descriptors of encoded ones."""
         out = self.scenes()
-        if kept is not None:
-            out.append(kept)
+        if picture is not None:
+            out.append(picture)
         asked: list[ToRenderer] = [*self.reads.values()]
         if self._question is not None:
             asked.append(self._question)

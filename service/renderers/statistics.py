@@ -49,7 +49,7 @@ class ClientStatistics:
 
 
 @dataclass(frozen=True)
-class Held:
+class RendererLoad:
     """The renderer's tasks and memory now."""
 
     tasks: int = 0
@@ -72,5 +72,5 @@ class Statistics(ClientStatistics):
     compile_s: Distribution = field(default_factory=Distribution)  # kernels that were not in memory
     kernels_found: int = 0  # ... and loads that found theirs there
     setup_s: Distribution = field(default_factory=Distribution)  # uploading and compiling, a load
-    held: Held = field(default_factory=Held)
+    load: RendererLoad = field(default_factory=RendererLoad)
     kernels_evicted: int = 0

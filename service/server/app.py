@@ -173,7 +173,7 @@ class _Server(uvicorn.Server):
         super().__init__(config)
         self._state = state
         self._watch = Watch()
-        self._told_at: float | None = None
+        self._signalled_at: float | None = None
         self.refused = False
 
     async def on_tick(self, counter: int) -> bool:
@@ -210,11 +210,11 @@ class _Server(uvicorn.Server):
         yield
 
     def _end(self) -> None:
-        if self._told_at is not None:
-            if time.monotonic() - self._told_at > AGAIN_S:  # end at once; the other processes end with this one
+        if self._signalled_at is not None:
+            if time.monotonic() - self._signalled_at > AGAIN_S:  # end at once; the other processes end with this one
                 os._exit(int(self.refused))
             return
-        self._told_at = time.monotonic()
+        self._signalled_at = time.monotonic()
         self.should_exit = True
         # Threads that pack a huge scene can't be interrupted, and Python waits for them.
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, [0])

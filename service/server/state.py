@@ -170,7 +170,7 @@ class AppState:
         """Bytes of this machine's memory that renderers on processors keep for a moment."""
         if self.config.ray is not None:  # theirs are other machines
             return 0
-        return sum(member.statistics.held.resting_bytes for member in self.renderers.members)
+        return sum(member.statistics.load.resting_bytes for member in self.renderers.members)
 
     async def gpu_missing(self) -> str | None:
         """The reason why SUNBOX_REQUIRE_GPU forbids to start, or None. Waits for the renderer."""

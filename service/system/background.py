@@ -84,12 +84,12 @@ async def _reported(what: str, work: Coroutine[Any, Any, None], died: Died | Non
 def report_callbacks(loop: asyncio.AbstractEventLoop) -> None:
     """Report errors in callbacks of this loop that nothing else encloses, and in tasks nobody asks for a result."""
 
-    def died(_: asyncio.AbstractEventLoop, told: dict[str, Any]) -> None:
-        error = told.get("exception")
+    def died(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error = context.get("exception")
         count_death("callback")
         log.error(
             "a callback of the event loop died",
-            {"reason": told.get("message")},
+            {"reason": context.get("message")},
             exc_info=(type(error), error, error.__traceback__) if error is not None else None,
         )
 

@@ -99,7 +99,7 @@ class Child:
         except subprocess.TimeoutExpired:
             return None
 
-    def own_bytes(self) -> int:
+    def private_bytes(self) -> int:
         """Bytes of its memory that are no file and shared with nobody; 0 where it has ended."""
         try:
             with open(f"/proc/{self.process.pid}/statm") as sizes:
@@ -141,14 +141,14 @@ class Children:
         """The bytes that the work at hand has taken so far in the children, as the system counts them."""
         with self._lock:
             working = list(self._working)
-        return sum(max(0, child.own_bytes() - child.rest) for child in working)
+        return sum(max(0, child.private_bytes() - child.rest) for child in working)
 
     @contextmanager
     def one(self) -> Iterator[Child]:
         """A child of the caller's own, which is killed where the block raises. Raises Closed."""
         child = self._take()
         child.given += 1
-        child.rest = child.own_bytes()
+        child.rest = child.private_bytes()
         with self._lock:
             self._working.add(child)
         try:

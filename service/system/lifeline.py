@@ -21,10 +21,10 @@ def end_with_pipe(descriptor: int) -> bool:
     """Has the kernel end this process with the one that has the pipe's other end; False when none has it."""
     # Opened anew: one description, which children share, has one owner to signal. SIGIO ends a process that
     # does not handle it, in the middle of a driver's compiler too.
-    own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
-    fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(own, fcntl.F_SETFL, fcntl.fcntl(own, fcntl.F_GETFL) | os.O_ASYNC)
-    return not hung_up(own)
+    reopened = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
+    fcntl.fcntl(reopened, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(reopened, fcntl.F_SETFL, fcntl.fcntl(reopened, fcntl.F_GETFL) | os.O_ASYNC)
+    return not hung_up(reopened)
 
 
 def hung_up(end: int) -> bool:

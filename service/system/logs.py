@@ -68,15 +68,15 @@ def level() -> int:
     return logging.getLogger(ROOMS[0]).getEffectiveLevel()
 
 
-def _thread_died(told: threading.ExceptHookArgs) -> None:
+def _thread_died(args: threading.ExceptHookArgs) -> None:
     count_death("thread")
-    _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
+    _uncaught(args.exc_type, args.exc_value, args.exc_traceback)
 
 
-def _finalizer_died(told: sys.UnraisableHookArgs) -> None:
+def _finalizer_died(args: sys.UnraisableHookArgs) -> None:
     count_death("finalizer")
-    trace = None if told.exc_value is None else (told.exc_type, told.exc_value, told.exc_traceback)
-    log.error("a finalizer died", {"of": repr(told.object)}, exc_info=trace)
+    trace = None if args.exc_value is None else (args.exc_type, args.exc_value, args.exc_traceback)
+    log.error("a finalizer died", {"of": repr(args.object)}, exc_info=trace)
 
 
 def _uncaught(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None) -> None:

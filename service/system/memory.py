@@ -26,7 +26,7 @@ SHARE = 0.5  # of the machine's memory: the rest is for the processes themselves
 RETRY_S = 5
 MIB = 2**20
 CGROUP = Path("/sys/fs/cgroup")
-OWN_GROUPS = Path("/proc/self/cgroup")
+PROCESS_CGROUP = Path("/proc/self/cgroup")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ class MemoryBudget:
             self._accounts.pop(holder, None)
 
     @contextmanager
-    def held(self, category: Category, size: int) -> Iterator[None]:
+    def reserved(self, category: Category, size: int) -> Iterator[None]:
         """A context in which `size` bytes count. Raises TooLarge, Unavailable."""
         with self.growing(category) as hold:
             hold(size)
@@ -218,13 +218,13 @@ def machine_memory() -> int:
 def _limits() -> Iterator[Path]:
     """Where limits of this process's control groups may stand [cgroups(7)]: its own, and those that it is within."""
     try:
-        lines = OWN_GROUPS.read_text().splitlines()
+        lines = PROCESS_CGROUP.read_text().splitlines()
     except OSError:
         return
     for line in lines:
         _, controllers, path = (*line.split(":", 2), "", "")[:3]
         if path and controllers in ("", "memory"):  # of version 2, and of version 1
             root, name = (CGROUP, "memory.max") if not controllers else (CGROUP / "memory", "memory.limit_in_bytes")
-            own = root / path.lstrip("/")
-            yield from (folder / name for folder in (own, *own.parents) if folder.is_relative_to(root))
+            cgroup = root / path.lstrip("/")
+            yield from (folder / name for folder in (cgroup, *cgroup.parents) if folder.is_relative_to(root))
             yield root / name  # in a container the group's path may be that of the machine

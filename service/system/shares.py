@@ -82,12 +82,12 @@ class Shares:
 
     def check(self, caller: str, n: int = 1) -> None:
         """Raise what `take` would raise, and take nothing."""
-        own, share = self._taken[caller], self._share(caller)
-        if own + n <= share:
+        taken, share = self._taken[caller], self._share(caller)
+        if taken + n <= share:
             return
         if n > self._each:
             raise TooLarge(f"This is more than one caller's share of {self._what}.")
-        if n <= share or own + n > self._each:
+        if n <= share or taken + n > self._each:
             raise TooManyRequests(
                 f"Your own {self._what} take all that one caller may have just now. Wait until some of them end.",
                 self._retry_s,
@@ -99,8 +99,8 @@ class Shares:
         return self._taken[caller] + n <= self._share(caller)
 
     def _share(self, caller: str) -> int:
-        own, free = self._taken[caller], self._most - self.total
-        return min(self._each, max((free + own) // 2, min(1, free) if own == 0 else 0))
+        taken, free = self._taken[caller], self._most - self.total
+        return min(self._each, max((free + taken) // 2, min(1, free) if taken == 0 else 0))
 
     def take(self, caller: str, n: int = 1) -> None:
         """Give `caller` another `n` units, which it has until they are released.

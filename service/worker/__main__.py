@@ -88,8 +88,8 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     limit = arguments.memory or default_limit(renderer.info, free_memory(renderer.context), arguments.host_memory)
     # Beside a GPU the denoiser's own process knows: the loop says it later.
     place = denoise.PROCESSOR if renderer.info["software"] else ""
-    told = {"denoiser": denoise.version(place), "memory_limit": None if limit == UNLIMITED else limit}
-    channel.send(end, Ready({**renderer.info, **told}))
+    facts = {"denoiser": denoise.version(place), "memory_limit": None if limit == UNLIMITED else limit}
+    channel.send(end, Ready({**renderer.info, **facts}))
     log.info("started", {"driver": renderer.info.get("renderer")})
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
         log.warning(
@@ -109,9 +109,9 @@ def closed_gpus(folder: Path) -> list[Path]:
 
 def _offer_itself() -> None:
     """Where memory runs out the kernel shall take this process, which is replaced, and not the server."""
-    own = Path("/proc/self/oom_score_adj")
+    score = Path("/proc/self/oom_score_adj")
     with contextlib.suppress(OSError):
-        own.write_text(str(min(1000, int(own.read_text()) + OOM_SCORE)))
+        score.write_text(str(min(1000, int(score.read_text()) + OOM_SCORE)))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ class Ending:
         self._reported = 0.0
 
     @property
-    def kept(self) -> bool:
+    def is_stored(self) -> bool:
         """True if the server keeps this picture: it does those of renders, not those of streams."""
         return self._server_keeps and not self._tracker.interactive
 
@@ -55,7 +55,7 @@ class Ending:
         full, checkpoints = self._residency.full, self.checkpoints
         if not checkpoints.under_way:
             ended, elapsed_s = self._tracker.reason is not None, self._tracker.clock.elapsed_s
-            if not self.kept or ended or not checkpoints.due(full, elapsed_s):
+            if not self.is_stored or ended or not checkpoints.due(full, elapsed_s):
                 return False
             checkpoints.begin(full)
             self._saved_bands = self._bands()
@@ -71,7 +71,7 @@ class Ending:
     @property
     def border(self) -> float:
         """The number of samples at which the picture is to be saved, and not traced further before; inf: at any."""
-        if not self.kept or self._tracker.reason is not None:
+        if not self.is_stored or self._tracker.reason is not None:
             return math.inf
         return self.checkpoints.border(self._residency.full, self._tracker.clock.elapsed_s)
 
@@ -99,7 +99,7 @@ class Ending:
     def finish(self) -> None:
         """Say that the render has ended; where the server keeps the picture, once it has been saved."""
         self._frames.owes_done = False
-        if self.kept and self._residency.loaded is not None and self._residency.full.samples:
+        if self.is_stored and self._residency.loaded is not None and self._residency.full.samples:
             self.checkpoints.begin(self._residency.full)
         else:
             self._say_done(None)

@@ -131,7 +131,7 @@ def warm(keys: Sequence[KernelKey], device: int | None, software: bool, jobs: in
         return records() / key.digest(driver)
 
     def is_there(key: KernelKey) -> bool:
-        return key.is_kept(info) if key.is_ours and not info["software"] else record(key).exists()
+        return key.is_cached(info) if key.is_ours and not info["software"] else record(key).exists()
 
     missing = [key for key in keys if not is_there(key)]
     done = len(keys) - len(missing)

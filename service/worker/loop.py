@@ -186,8 +186,8 @@ class Loop:
             self._renderer.tidy()
             kernels, evicted = self._renderer.kernels, self._renderer.kernels_evicted
             self._resting = self._resting_bytes
-            now_held = len(self._tasks), self._memory.used, self._resting, kernels
-            self._send(Usage(used, traced - self._traced, *now_held, evicted - self._evicted))
+            resident = len(self._tasks), self._memory.used, self._resting, kernels
+            self._send(Usage(used, traced - self._traced, *resident, evicted - self._evicted))
             self._used_s.clear()
             self._evicted = evicted
             self._traced, self._reported = traced, now

@@ -165,18 +165,18 @@ class NoiseReading:
         self.noise: float | None = None  # as it was last read
         self.at = 0  # samples at the last reading
         self._due = 0.0  # the time of the next
-        self._own = False  # whether it was read here, from these samples
+        self._is_measured = False  # whether it was read here, from these samples
 
     def set(self, samples: int, noise: float | None) -> None:
         """Take over what was reported of a picture with that many samples, and may have been read of fewer."""
-        self.at, self.noise, self._own = samples, noise, False
+        self.at, self.noise, self._is_measured = samples, noise, False
 
     def read(self, picture: Picture, fresh: bool = False) -> float | None:
         """`Picture.noise`, not the newest unless `fresh`."""
         samples, began = picture.samples, time.monotonic()
-        newer = samples > self.at or (fresh and not self._own)
+        newer = samples > self.at or (fresh and not self._is_measured)
         if samples >= 2 and newer and (fresh or began >= self._due):
-            self.noise, self.at, self._own = picture.noise(), samples, True
+            self.noise, self.at, self._is_measured = picture.noise(), samples, True
             now = time.monotonic()
             self._due = now + NOISE_PAUSE * (now - began)
         return self.noise

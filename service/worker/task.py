@@ -23,7 +23,7 @@ class Task:
         self.picture = TaskPicture(context, number, client, self)
         self._later: list[ToRenderer] = []  # behind the pending update
         self._paused = self._away = False
-        self._held_until = 0.0  # by the monotonic clock
+        self._pause_until = 0.0  # by the monotonic clock
 
     @property
     def attempted(self) -> int:
@@ -50,7 +50,7 @@ class Task:
             return picture.updates.previews and not self._paused
         if phase in (Phase.UPDATING, Phase.SAVING) or picture.frames.due:
             return True
-        stands = self._paused or picture.frames.denoising.holds or self._held_s
+        stands = self._paused or picture.frames.denoising.holds or self._pause_s
         return phase is Phase.TRACING and (picture.unseen or not stands) and not picture.waiting
 
     @property
@@ -74,12 +74,12 @@ class Task:
     def left_s(self) -> float | None:
         """Seconds until it is ready by itself; None where it is not, or is already."""
         home = self.picture.home
-        return home.left_s if home.waiting else self._held_s or None
+        return home.left_s if home.waiting else self._pause_s or None
 
     @property
-    def _held_s(self) -> float:
+    def _pause_s(self) -> float:
         """Seconds for which it goes on standing still, unless an update comes."""
-        return max(0.0, self._held_until - time.monotonic())
+        return max(0.0, self._pause_until - time.monotonic())
 
     @property
     def bytes(self) -> int:
@@ -93,7 +93,7 @@ class Task:
 
     def update(self, update: Update) -> None:
         """Take an update, which the next turn applies together with others that wait."""
-        self._held_until = 0.0
+        self._pause_until = 0.0
         self.picture.updates.join(update)
 
     def defers(self, message: ToRenderer) -> bool:
@@ -133,7 +133,7 @@ class Task:
 
     def hold(self) -> None:
         """Stand still for a moment: an update is being packed, for which somebody waits."""
-        self._held_until = time.monotonic() + HOLD_S
+        self._pause_until = time.monotonic() + HOLD_S
 
     def evict(self) -> None:
         self.picture.evict()

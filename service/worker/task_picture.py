@@ -214,8 +214,8 @@ class TaskPicture:
         if update.may_not_fit:
             setup_s, full = time.monotonic() - began, residency.full
             kernel = full.compile_ms + updates.take_compile_ms(), full.scene.features, full.scene.spared
-            told = self._number, self.tracker.generation, setup_s, *kernel, self.ending.warnings
-            self._send(Loaded(*told, full.traces_caustics))
+            head = self._number, self.tracker.generation, setup_s, *kernel, self.ending.warnings
+            self._send(Loaded(*head, full.traces_caustics))
         if update.scene is not None or update.settings is not None:
             updates.foresee(settings)
 
@@ -229,7 +229,7 @@ class TaskPicture:
 
     def evict(self) -> None:
         """Leave the device: for the machine's memory, or for good where the server has the picture already."""
-        if self._forget is not None and self.ending.kept:
+        if self._forget is not None and self.ending.is_stored:
             self._part()
             self._forget(self._number)
         else:

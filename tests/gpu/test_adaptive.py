@@ -103,7 +103,7 @@ def test_pixels_get_all_that_a_decision_wants(gpu: Renderer, monkeypatch: pytest
     monkeypatch.setattr(adaptive, "SLICE_S", 1e-12)
     for samples in (decision + 1, decision + 22):
         made.trace(600, samples)
-        wanted = made._passes.schedule._kept().at(samples)
+        wanted = made._passes.schedule._read_plan().at(samples)
         y, x = np.mgrid[: SIZE["height"], : SIZE["width"]]
         assert np.array_equal(counts(made), wanted[y // AREA, x // AREA, y % CLASSES])
     made.release()

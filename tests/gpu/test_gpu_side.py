@@ -188,10 +188,10 @@ def test_a_compiler_keeps_what_a_renderer_loads(gpu: Renderer, hardware: None) -
     arrays = pack(parse_scene(LIT), Images()).arrays
     key = kernel_key(arrays, RenderSettings(8, 8), frozenset({"HAS_QUADS"}), GUIDES)
     info = contexts.describe(gpu.context)
-    assert key.is_ours and not key.is_kept(info)
-    assert Precompiler().compile(key)[1] and key.is_kept(info)
+    assert key.is_ours and not key.is_cached(info)
+    assert Precompiler().compile(key)[1] and key.is_cached(info)
     assert Precompiler().compile(key)[0] < 50.0
-    assert not key.is_kept(info | {"version": "another"})
+    assert not key.is_cached(info | {"version": "another"})
     assert not KernelKey((), (), "merge.comp").is_ours
     contexts.use(gpu.context)
     assert ProgramBinaries(gpu.context).load(GUIDES, key.text) is not None

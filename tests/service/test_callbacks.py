@@ -16,7 +16,7 @@ from service.config import Config
 from service.problems import InvalidDocument, NotFound, TooManyRequests
 from service.server.callbacks import posting
 from service.server.callbacks.queue import AT_ONCE, EACH, OF_ONE_HOST, PAUSES, Callbacks
-from service.server.storage.callback_rows import KEPT, Callback, CallbackRows, insert
+from service.server.storage.callback_rows import RETAINED, Callback, CallbackRows, insert
 from service.server.storage.database import Database
 from service.system.shares import CALLER
 from sunbox import Client
@@ -302,8 +302,8 @@ def test_eight_attempts_are_made(tmp_path: Path) -> None:
 
 
 def test_what_is_kept_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.server.storage.callback_rows.KEPT", 2)
-    assert KEPT == 1000
+    monkeypatch.setattr("service.server.storage.callback_rows.RETAINED", 2)
+    assert RETAINED == 1000
     rows = filled(tmp_path, {str(i): "https://hooks.example.org/" for i in range(5)})
     callbacks = Callbacks(Config(data_dir=tmp_path, callback_hosts=["hooks.example.org"]), missing)
     for answer in (410, 200, 200, 200, 200):

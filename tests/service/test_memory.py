@@ -53,7 +53,7 @@ def test_bytes_count_until_they_are_released() -> None:
     assert budget.used()["scenes"] == 90  # as before
     budget.hold("scenes", first, 20)
     budget.release(second)
-    with budget.held("bodies", 70):
+    with budget.reserved("bodies", 70):
         assert sum(budget.used().values()) == 100
     with pytest.raises(TooLarge, match="SUNBOX_MEMORY"):
         budget.hold("scenes", second, 101)
@@ -101,9 +101,9 @@ def test_caches_give_way_to_work() -> None:
         kept[0] -= min(kept[0], size)
 
     budget.cache("assets", lambda: kept[0], shrink)
-    with budget.held("bodies", 20):
+    with budget.reserved("bodies", 20):
         assert kept == [80]
-    with budget.held("bodies", 50):
+    with budget.reserved("bodies", 50):
         assert kept == [50] and budget.used()["assets"] == 50
 
 
@@ -147,7 +147,7 @@ def test_a_container_s_limit_counts(
     group: str, files: dict[str, str], limit: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "CGROUP", tmp_path / "groups")
-    monkeypatch.setattr(memory, "OWN_GROUPS", tmp_path / "own")
+    monkeypatch.setattr(memory, "PROCESS_CGROUP", tmp_path / "own")
     machine = machine_memory()
     assert machine == os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     (tmp_path / "own").write_text(group + "\n")
@@ -220,7 +220,7 @@ def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 
     asyncio.run(take(True))
     assert budget.used()["bodies"] == 0
-    with budget.held("scenes", MIB), pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
+    with budget.reserved("scenes", MIB), pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
         asyncio.run(take(True))
     assert budget.used()["bodies"] == 0
     bodies.close()

@@ -173,7 +173,7 @@ def _pack_cache(folder: Path) -> Hammer:
         budget.shrink(i % 100)
         PackCache(2, budget).gather(SimpleNamespace)
 
-    return turn, lambda: all(c.bytes == sum(size for _, size in c._kept.values()) for c in caches)
+    return turn, lambda: all(c.bytes == sum(size for _, size in c._values.values()) for c in caches)
 
 
 def _packed_scenes(folder: Path) -> Hammer:
@@ -259,7 +259,7 @@ def _children(folder: Path) -> Hammer:
     class Stand:
         """In place of a child that is there already."""
 
-        is_spent, given, process, own_bytes = False, 0, SimpleNamespace(poll=lambda: None), lambda child: 0
+        is_spent, given, process, private_bytes = False, 0, SimpleNamespace(poll=lambda: None), lambda child: 0
 
         def __init__(self) -> None:
             self.mine = threading.Lock()

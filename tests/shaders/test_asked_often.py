@@ -57,7 +57,7 @@ def pictures(gpu: Renderer, scene: dict[str, Any], samples: int, **settings: Any
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(source, "_read", changed)
-        patch.setattr(source, "_own", lambda entry: source._Assembly((source.SHADERS,)).make(entry))
+        patch.setattr(source, "_packaged", lambda entry: source._Assembly((source.SHADERS,)).make(entry))
         with Renderer() as renderer:
             once = picture(renderer, scene, samples, SKY, **settings).read()[..., :3]
     return picture(gpu, scene, samples, SKY, **settings).read()[..., :3], once

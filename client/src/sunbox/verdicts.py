@@ -69,7 +69,7 @@ async def _side(transport: Transport, side: Any, settings: dict[str, Any], point
         return side
     if not isinstance(side, dict) and Path(side).suffix.lower() == ".exr":
         return await transport.upload_file(Path(side))
-    own: dict[str, Any] = {}
+    given: dict[str, Any] = {}
     if isinstance(side, dict) and "scene" in side:
-        side, own = side["scene"], dict(side.get("settings") or {})
-    return {"scene": await transport.uploaded(side, pointer), "settings": own | settings}
+        side, given = side["scene"], dict(side.get("settings") or {})
+    return {"scene": await transport.uploaded(side, pointer), "settings": given | settings}

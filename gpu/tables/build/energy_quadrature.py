@@ -38,7 +38,7 @@ def albedos(mu: float, cos_phi: float, ax: float, ay: float, eta: float, n: int)
     lam_o = _lambda(ax * x, ay * y, z)
     length = math.sqrt((ax * x) ** 2 + (ay * y) ** 2 + z * z)
     vx, vy, vz = ax * x / length, ay * y / length, z / length
-    one = reflected = kept_a = kept_b = 0.0
+    one = reflected = found_a = found_b = 0.0
     # Many rows, each turned against the last one: head-on, a whole row is masked or not.
     rows, columns = 3 * n, n // 3
     step_x, step_y = math.cos(2.0 * math.pi / columns), math.sin(2.0 * math.pi / columns)
@@ -59,8 +59,8 @@ def albedos(mu: float, cos_phi: float, ax: float, ay: float, eta: float, n: int)
                 g = (1.0 + lam_o) / (1.0 + lam_o + _lambda(ax * ix, ay * iy, iz))
                 one += g
                 reflected += f_a * g
-                kept_a += f_a * g
-                kept_b += f_b * g
+                found_a += f_a * g
+                found_b += f_b * g
             for side in range(2):
                 k = 1.0 / eta if side == 0 else eta
                 cos2 = 1.0 - k * k * (1.0 - c * c)
@@ -71,11 +71,11 @@ def albedos(mu: float, cos_phi: float, ax: float, ay: float, eta: float, n: int)
                 if tz < 0.0:
                     g = 1.0 / (1.0 + _lambda(ax * tx, ay * ty, tz))
                     if side == 0:
-                        kept_a += (1.0 - f_a) * g
+                        found_a += (1.0 - f_a) * g
                     else:
-                        kept_b += (1.0 - f_b) * g
+                        found_b += (1.0 - f_b) * g
     s = 1.0 / (rows * columns)
-    return one * s, reflected * s, 1.0 - kept_a * s, 1.0 - kept_b * s
+    return one * s, reflected * s, 1.0 - found_a * s, 1.0 - found_b * s
 
 
 @jit_loose

@@ -30,7 +30,7 @@ _STRETCHED = 42  # points a side for stretched lobes
 SLACK = 0.001  # by how much the energy put back may exceed the loss between nodes: a third of what a furnace allows
 SLACK_RESTORED = 0.002  # the same where the mean is corrected
 _MEDIUM = 60  # points a side of the quadrature for that
-_HELD_BACK = 5e-5  # share of the mean that is not put back: the quadrature's error
+_NOT_RESTORED = 5e-5  # share of the mean that is not put back: the quadrature's error
 _GRAZING = 0.05  # least cosine for stretched lobes: beyond 87 degrees their mean is not bounded
 _LEAST_LOST = 0.003  # mean loss below which nothing is corrected
 _MARGIN_STRETCHED = 0.0015  # how far below the truth the fit of stretched lobes costs nothing more
@@ -140,7 +140,7 @@ def _fractions() -> list[np.ndarray]:
     return [np.zeros(5), *inner, *planes]
 
 
-def _kept(f: np.ndarray) -> np.ndarray:
+def _stretched_at(f: np.ndarray) -> np.ndarray:
     """The albedos of stretched lobes, float32, at those places of all cells."""
     counts = zip(STRETCHED_SHAPE, f, strict=True)
     places = [(np.arange(n - 1) + x) / (n - 1) if x > 0 else np.linspace(0, 1, n) for n, x in counts]
@@ -185,15 +185,15 @@ def _means(albedo: np.ndarray, stretched: np.ndarray) -> np.ndarray:
     return mean
 
 
-def _restored(true: np.ndarray, kept: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _restored(true: np.ndarray, tabulated: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """How much more is lost on average than the tables say, (..., D, 2) to (..., 2); `weight` (D,) of directions.
 
     In a dense body light is scattered index^2 times, so that even 0.001 each time would show. Nowhere does this put
     back more than `SLACK_RESTORED` above the loss.
     """
-    lost, found = (np.einsum("...dc,d->...c", x, weight / weight.sum()) for x in (true, kept))
-    ratio = (lost - _HELD_BACK) / np.maximum(found, 1e-9)
-    bound = ((true + SLACK_RESTORED) / np.maximum(kept, 1e-9)).min(-2)
+    lost, found = (np.einsum("...dc,d->...c", x, weight / weight.sum()) for x in (true, tabulated))
+    ratio = (lost - _NOT_RESTORED) / np.maximum(found, 1e-9)
+    bound = ((true + SLACK_RESTORED) / np.maximum(tabulated, 1e-9)).min(-2)
     ratio = np.minimum(ratio, np.maximum(bound, 1.0)).clip(0.9, 1.1)
     return np.asarray(np.where(lost > _LEAST_LOST, ratio, 1.0))
 
@@ -204,9 +204,9 @@ def _restoring(albedo: np.ndarray, stretched: np.ndarray, samples: Samples) -> n
     mu = np.sqrt((np.arange(96) + 0.5) / 96)
     true = _round(energy.eta_nodes(etas), energy.roughness_nodes(steps), mu, _MEDIUM)[..., 2:]
     at = np.linspace(0, ETA_COUNT - 1, etas), np.linspace(0, energy.ALBEDO_SHAPE[1] - 1, steps)
-    kept = _resized(albedo[..., 2:], *at, np.sqrt(mu) * (energy.MU_COUNT - 1))
+    tabulated = _resized(albedo[..., 2:], *at, np.sqrt(mu) * (energy.MU_COUNT - 1))
     out = np.empty((*MEAN_SHAPE, 2))
-    out[:, 0] = _restored(true, kept, np.ones(len(mu)))
+    out[:, 0] = _restored(true, tabulated, np.ones(len(mu)))
 
     trues: list[np.ndarray] = []
     kepts: list[np.ndarray] = []
@@ -240,7 +240,7 @@ def _sheen_table() -> np.ndarray:
 
 def compute() -> dict[str, np.ndarray]:
     """The tables of `gpu.tables.energy.Tables`, float64 in 0..1."""
-    samples = [(f, _kept(f)) for f in _fractions()]
+    samples = [(f, _stretched_at(f)) for f in _fractions()]
     albedo, stretched = _round_table(), _stretched_table(samples)
     mean = _means(albedo, stretched)
     # Both factors of the energy that is put back are too small by that much, and are divided by their mean.

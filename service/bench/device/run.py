@@ -27,10 +27,10 @@ NOT_BUILT = {
 
 
 class _Run:
-    """The parts so far. `told` is called with the name of each."""
+    """The parts so far. `progress` is called with the name of each."""
 
-    def __init__(self, options: Options, cache: Path, told: Callable[[str], None]) -> None:
-        self.options, self.cache, self._told = options, cache, told
+    def __init__(self, options: Options, cache: Path, progress: Callable[[str], None]) -> None:
+        self.options, self.cache, self._progress = options, cache, progress
         self.began = time.perf_counter()
         self.missing = [{"what": what, "why": why} for what, why in NOT_BUILT.items()]
 
@@ -50,7 +50,7 @@ class _Run:
         if spent > 1.5 * self.options.seconds + PART_S:
             self.lacks(what, f"left out: {spent:.0f} s had gone, of {self.options.seconds:.0f} s that were given")
             return None
-        self._told(what)
+        self._progress(what)
         try:
             return call()
         except (Lost, OSError, RuntimeError, WebSocketException) as error:  # all but the first are of a server
@@ -62,10 +62,10 @@ class _Run:
         return PART_S + self.options.seconds / 4
 
 
-def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
-    """A `report.Report` as JSON has it. `told` is called with the name of each part."""
+def measure(options: Options, progress: Callable[[str], None]) -> dict[str, Any]:
+    """A `report.Report` as JSON has it. `progress` is called with the name of each part."""
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder:
-        run = _Run(options, Path(folder), told)
+        run = _Run(options, Path(folder), progress)
         device = run.part("the device", device_limits, options.device)
         found: Row = {
             "device": device,

@@ -97,13 +97,13 @@ def converted(old: Document, before: type[AnySurface], after: type[AnySurface]) 
         if value is not None and (parameter.takes_texture or not isinstance(value, dict)):
             material[name] = value
             used.add(other.name)
-    given, own = _color_name(was, old), _color_name(wanted, {})
-    if given and own and given not in material:
-        material[own] = old.get(given, was[given].hints.get("default"))
+    given, color = _color_name(was, old), _color_name(wanted, {})
+    if given and color and given not in material:
+        material[color] = old.get(given, was[given].hints.get("default"))
         used.add(given)
     make = _HIGHLIGHTS.get(_highlight(wanted).get("as", ""))
-    if make is not None and own is not None and _is_plain(old):
-        material |= make(old, _highlight(wanted)) | {own: _diffuse(old)}
+    if make is not None and color is not None and _is_plain(old):
+        material |= make(old, _highlight(wanted)) | {color: _diffuse(old)}
         used.update(_WIDTHS)
     for name, parameter in wanted.items():  # what this model asks for and the other has not
         if parameter.is_required and name not in material and not parameter.choices and not parameter.file_kind:
@@ -146,8 +146,8 @@ def _color_name(of: Mapping[str, Parameter], document: Document) -> str | None:
         return None
     highlight, first = _highlight(of), base[0]
     facets = highlight["color"] if highlight.get("as") == "alpha" else None
-    own = document.get(first.name, first.hints.get("default"))
-    is_black = facets in document and not isinstance(own, dict) and max(_linear(own)) == 0
+    value = document.get(first.name, first.hints.get("default"))
+    is_black = facets in document and not isinstance(value, dict) and max(_linear(value)) == 0
     return facets if is_black else first.name
 
 

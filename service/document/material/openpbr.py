@@ -395,5 +395,5 @@ class OpenpbrMaterial(AnySurface):
     @property
     def anisotropic(self) -> Any:
         """That of the base, or else of the coat."""
-        own = self.specular_roughness_anisotropy
-        return own if isinstance(own, ScalarTexture) or own > 0 else self.coat_roughness_anisotropy
+        base = self.specular_roughness_anisotropy
+        return base if isinstance(base, ScalarTexture) or base > 0 else self.coat_roughness_anisotropy

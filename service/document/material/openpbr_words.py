@@ -125,9 +125,9 @@ def leave(old: Document, made: Document) -> set[str]:
     elif luminance > 0:
         made["emission"] = [rounded(luminance / NITS * x, 6) for x in _linear(shine)]
     weight, base = old.get("base_weight", 1), old.get("base_color", 0.8)
-    own = next((name for name in ("base_color", "albedo", "diffuse") if name in made), "base_color")
-    if _is_number(weight) and not isinstance(base, dict) and own in made:
-        made[own] = [rounded(weight * x, 6) for x in _linear(base)]
+    color_name = next((name for name in ("base_color", "albedo", "diffuse") if name in made), "base_color")
+    if _is_number(weight) and not isinstance(base, dict) and color_name in made:
+        made[color_name] = [rounded(weight * x, 6) for x in _linear(base)]
         used.add("base_weight")
     if _is_number(made.get("anisotropic")):
         made["anisotropic"] = rounded(min(1.0, made["anisotropic"] / STRETCH), 4)

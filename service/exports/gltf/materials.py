@@ -61,7 +61,7 @@ class Materials:
     def _as_principled(self, name: str) -> PrincipledMaterial:
         if name not in self._plain:
             material, pointer = self.scene.materials[name], f"/materials/{escaped(name)}"
-            self._plain[name] = as_principled(material, pointer, self.losses, kept={FILM_WEIGHT})
+            self._plain[name] = as_principled(material, pointer, self.losses, written={FILM_WEIGHT})
         return self._plain[name]
 
     def _unlit(self, material: DiffuseMaterial, name: str, asked: Asked) -> Tree:

@@ -50,11 +50,11 @@ class Nodes:
         self._append(self.builder.add("nodes", node))
 
     def _open(self, names: list[str]) -> None:
-        kept = 0
-        while kept < min(len(names), len(self._groups)) and self._groups[kept][0] == names[kept]:
-            kept += 1
-        del self._groups[kept:]
-        for name in names[kept:]:
+        common = 0
+        while common < min(len(names), len(self._groups)) and self._groups[common][0] == names[common]:
+            common += 1
+        del self._groups[common:]
+        for name in names[common:]:
             index = self.builder.add("nodes", {**({"name": name} if name else {}), "children": []})
             self._append(index)
             self._groups.append((name, index))

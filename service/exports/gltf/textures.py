@@ -82,8 +82,8 @@ class Textures:
 
     def plane(self, reference: Reference, channel: int, pointer: str) -> Plane:
         """The plane that is read into a channel of a glTF texture, by default from the same channel."""
-        own = None if isinstance(reference, NormalTexture) else reference.channel
-        return Plane(reference, channel if own is None else "rgba".index(own), pointer=pointer)
+        named = None if isinstance(reference, NormalTexture) else reference.channel
+        return Plane(reference, channel if named is None else "rgba".index(named), pointer=pointer)
 
     def has_alpha(self, reference: Reference) -> bool:
         texture = self._texture(reference)
@@ -106,29 +106,29 @@ class Textures:
     def _together(self, planes: Planes) -> Planes:
         """The planes without textures that cannot share an image with the first one: glTF reads them all from one."""
         first: Plane | None = None
-        kept: list[Plane | None] = []
+        chosen: list[Plane | None] = []
         for plane in planes:
             if plane is None or plane.reference is None:
-                kept.append(plane)
+                chosen.append(plane)
                 continue
             texture = self._texture(plane.reference)
             if not isinstance(texture, ImageTexture | CheckerTexture):
                 self.losses.add(plane.pointer, "textures of this kind have no place in glTF; its factor is written")
-                kept.append(Plane(pointer=plane.pointer))
+                chosen.append(Plane(pointer=plane.pointer))
             elif is_projected(texture):
                 detail = f"glTF has texture coordinates alone, and none by {texture.mapping}; its factor is written"
                 self.losses.add(plane.pointer, detail)
-                kept.append(Plane(pointer=plane.pointer))
+                chosen.append(Plane(pointer=plane.pointer))
             elif first is None or self._placed(self._texture(first.reference)) == self._placed(texture):  # type: ignore[arg-type]
                 first = first or plane
-                kept.append(plane)
+                chosen.append(plane)
             else:
                 detail = (
                     "glTF reads it from one image with another texture, which lies elsewhere; its mean is written"
                 )
                 self.losses.add(plane.pointer, detail)
-                kept.append(Plane(value=float(self._stored(plane, False)[0].mean()) / 255, pointer=plane.pointer))
-        return kept[0], kept[1], kept[2], kept[3]
+                chosen.append(Plane(value=float(self._stored(plane, False)[0].mean()) / 255, pointer=plane.pointer))
+        return chosen[0], chosen[1], chosen[2], chosen[3]
 
     def _is_srgb(self, reference: Reference) -> bool:
         texture = self._texture(reference)

@@ -136,8 +136,8 @@ class Graph:
 
     def tangent(self, degrees: float) -> Value:
         """The surface's own, turned counter-clockwise; rotate3d turns the other way."""
-        own, about = self._node("tangent", "vector3"), self._node("normal", "vector3")
-        inputs = [input_to("in", "vector3", own), input_to("axis", "vector3", about)]
+        tangent, about = self._node("tangent", "vector3"), self._node("normal", "vector3")
+        inputs = [input_to("in", "vector3", tangent), input_to("axis", "vector3", about)]
         return Value("vector3", node=self._node("rotate3d", "vector3", *inputs, input_of("amount", number(-degrees))))
 
     def converted(self, value: Value, type: str) -> Value:
@@ -199,13 +199,13 @@ class Graph:
         if texture.uv:
             self.tell(parameter, "a second set of coordinates is read by few programs")
         space = self._space(value, texture)
-        own = f' colorspace="{SPACES[space]}"' if type.startswith("color") else ""
+        colorspace = f' colorspace="{SPACES[space]}"' if type.startswith("color") else ""
         path = escape(self.images.path(value.texture, texture))
         if texture.mapping == "box":
-            return self._projected(texture, parameter, type, f'type="filename" value="{path}"{own}')
+            return self._projected(texture, parameter, type, f'type="filename" value="{path}"{colorspace}')
         if texture.mapping == "sphere":
             self.tell(parameter, "an image by sphere is written by texture coordinates")
-        inputs = [f'<input name="file" type="filename" value="{path}"{own} />', self._placed(texture)]
+        inputs = [f'<input name="file" type="filename" value="{path}"{colorspace} />', self._placed(texture)]
         if texture.wrap != "repeat":
             mode = WRAPS[texture.wrap]
             inputs += [f'<input name="{axis}addressmode" type="string" value="{mode}" />' for axis in "uv"]
@@ -220,9 +220,9 @@ class Graph:
             self.tell(parameter, "an image by box repeats in MaterialX")
         inputs = [f'<input name="file{axis}" {file} />' for axis in "xyz"]
         if texture.scale[0] != 1:
-            own = self._node("position", "vector3", '<input name="space" type="string" value="object" />')
+            position = self._node("position", "vector3", '<input name="space" type="string" value="object" />')
             by = input_of("in2", number(texture.scale[0]))
-            place = self._node("multiply", "vector3", input_to("in1", "vector3", own), by)
+            place = self._node("multiply", "vector3", input_to("in1", "vector3", position), by)
             inputs.append(input_to("position", "vector3", place))
         up = '<input name="upaxis" type="integer" value="1" />'
         return self._node("triplanarprojection", type, *inputs, up, input_of("blend", number(0.0)))
@@ -243,12 +243,12 @@ class Graph:
         is_plain = texture.scale == (1, 1) and texture.rotation == 0 and texture.offset == (0, 0)
         if is_plain and not index:
             return ""
-        own = self._node("texcoord", "vector2", index)
+        coordinates = self._node("texcoord", "vector2", index)
         if is_plain:
-            return input_to("texcoord", "vector2", own)
+            return input_to("texcoord", "vector2", coordinates)
         u, v = (1 / each if each else 1e6 for each in texture.scale)
         inputs = [
-            input_to("texcoord", "vector2", own),
+            input_to("texcoord", "vector2", coordinates),
             input_of("scale", Value("vector2", (u, v))),
             input_of("rotate", number(-texture.rotation)),
             input_of("offset", Value("vector2", (-texture.offset[0], -texture.offset[1]))),

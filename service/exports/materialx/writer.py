@@ -34,15 +34,15 @@ def write_material(scene: Scene, files: Files, limits: Limits) -> Exported:
     """The materials of a scene without shapes. Raises as `write_scene`."""
     losses, images, texts, taken = Losses(), Images(scene, files), list[str](), set[str]()
     for name in scene.materials:
-        own = valid(name, taken)
-        taken.add(own)
-        texts.append(_written(scene, name, own, images, losses))
+        valid_name = valid(name, taken)
+        taken.add(valid_name)
+        texts.append(_written(scene, name, valid_name, images, losses))
     text = (HEAD + "\n".join(texts) + "\n</materialx>\n").encode()
     check_size(len(text) + sum(map(len, images.beside.values())), limits)
     return Exported([text], losses, images.beside)
 
 
-def _written(scene: Scene, name: str, own: str, images: Images, losses: Losses) -> str:
+def _written(scene: Scene, name: str, valid_name: str, images: Images, losses: Losses) -> str:
     """One material as the model that has most of its parameters."""
     pointer = f"/materials/{escaped(name)}"
     material, graph = scene.materials[name], Graph(images, pointer, losses)
@@ -55,14 +55,14 @@ def _written(scene: Scene, name: str, own: str, images: Images, losses: Losses) 
         graph.tell("emission_sides", "the file does not say on which sides a surface shines")
     if material.height is not None:
         graph.tell("height", "heights are not written")
-    if own != name:
-        losses.add(pointer, f"names in MaterialX have letters, digits and _ only; it is called {own}")
+    if valid_name != name:
+        losses.add(pointer, f"names in MaterialX have letters, digits and _ only; it is called {valid_name}")
     values = {each: _value(graph, MODELS[model].defaults[each], output) for each, output in inputs.items()}
-    lines = [graph.input(each, value, f"NG_{own}") for each, value in values.items() if value is not None]
-    shader = [f'  <{model} name="SR_{own}" type="surfaceshader">', *lines, f"  </{model}>"]
-    wired = f'<input name="surfaceshader" type="surfaceshader" nodename="SR_{own}" />'
-    shader.append(f'  <surfacematerial name="{own}" type="material">{wired}</surfacematerial>')
-    text = graph.text(f"NG_{own}")
+    lines = [graph.input(each, value, f"NG_{valid_name}") for each, value in values.items() if value is not None]
+    shader = [f'  <{model} name="SR_{valid_name}" type="surfaceshader">', *lines, f"  </{model}>"]
+    wired = f'<input name="surfaceshader" type="surfaceshader" nodename="SR_{valid_name}" />'
+    shader.append(f'  <surfacematerial name="{valid_name}" type="material">{wired}</surfacematerial>')
+    text = graph.text(f"NG_{valid_name}")
     return "\n".join([*([text] if text else []), *shader])
 
 

@@ -63,13 +63,13 @@ def png_with_encoding(png: bytes, codes: tuple[int, int] | None, profile: bytes 
     if profile is not None:
         chunks += _chunk(b"iCCP", b"ICC\0\0" + zlib.compress(profile))
     header = len(PNG_MAGIC) + 25
-    at, kept = header, [png[:header], chunks]
+    at, parts = header, [png[:header], chunks]
     while at + 12 <= len(png):
         size, kind = struct.unpack_from(">I4s", png, at)
         if kind not in (b"sRGB", b"gAMA", b"cHRM", b"iCCP", b"cICP"):
-            kept.append(png[at : at + 12 + size])
+            parts.append(png[at : at + 12 + size])
         at += 12 + size
-    return b"".join(kept)
+    return b"".join(parts)
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

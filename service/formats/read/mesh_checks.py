@@ -86,8 +86,8 @@ def _edges(faces: Indices, count: int) -> tuple[int, int, int]:
                 start = faces[at : at + CHUNK, k].astype(np.int64)
                 end = faces[at : at + CHUNK, (k + 1) % 3].astype(np.int64)
                 least = np.minimum(start, end)
-                own = (least * count + np.maximum(start, end)) * 2 + (start > end)
-                pieces.append(own if shares == 1 else own[least % shares == share])
+                edges = (least * count + np.maximum(start, end)) * 2 + (start > end)
+                pieces.append(edges if shares == 1 else edges[least % shares == share])
         keys = np.concatenate(pieces)
         if not len(keys):
             continue

@@ -69,8 +69,8 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
             fd, table = publish(arrays)
             return {"arrays": table, **facts}, fd
     except ParseError as error:
-        told = {"error": error.detail[:2000], "pointer": error.pointer[:1000]}
-        return told | {"is_missing": isinstance(error, MissingExtra)}, -1
+        reply = {"error": error.detail[:2000], "pointer": error.pointer[:1000]}
+        return reply | {"is_missing": isinstance(error, MissingExtra)}, -1
     except Exception as error:
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
             return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1

@@ -67,9 +67,9 @@ def assemble(
     else:
         buffers, models = same.triangle_buffers, same.models
     records, nodes, placed = _in_shared_memory(rebased, tree)
-    own = buffers.triangles[: len(triangles)]
-    hide((*records.values(), placed) if same is not None else (*records.values(), placed, own), shapes)
-    lights, areas = area_lights(records, own, materials)
+    plain = buffers.triangles[: len(triangles)]
+    hide((*records.values(), placed) if same is not None else (*records.values(), placed, plain), shapes)
+    lights, areas = area_lights(records, plain, materials)
     records[ShapeKind.TRIANGLE] = buffers.triangles
     extents = replace(extents, warnings=extents.warnings + _degenerate(world, triangles))
     for array in (*records.values(), nodes, placed, *buffers.arrays):
@@ -178,8 +178,13 @@ class Earlier:
         """The key of the triangles that no instance shows."""
         if self.contents is None or any(materials.names[m.material] in materials.emissive for m in world.meshes):
             return None
-        own = tuple((mesh.shape, self.contents[mesh.shape]) for mesh in world.meshes)
-        return own, vec3(origin) if own else None, tuple(materials.names), tuple(materials.charts.items())
+        mesh_contents = tuple((mesh.shape, self.contents[mesh.shape]) for mesh in world.meshes)
+        return (
+            mesh_contents,
+            vec3(origin) if mesh_contents else None,
+            tuple(materials.names),
+            tuple(materials.charts.items()),
+        )
 
     def same_triangles(self, unshared_key: Hashable, models: Sequence[SharedMesh]) -> Geometry | None:
         """The newest geometry with the same triangles in the same order, or None."""

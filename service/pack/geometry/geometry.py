@@ -39,8 +39,8 @@ def write_triangles(
     triangles: Triangles, places: np.ndarray | None, shared: Sequence[SharedMesh]
 ) -> tuple[TriangleBuffers, tuple[SharedMesh, ...]]:
     """Write everything into one arena, in which the models stay from now on."""
-    own = len(triangles)
-    count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
+    start = len(triangles)
+    count, node_count = start + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
     tangents = triangles.any_tangents or any(each.any_tangents for each in shared)
     smooth = count if tangents or triangles.any_smooth or any(each.any_smooth for each in shared) else 0
     shapes = {name: (count * _some_have(name, triangles, shared), 3, width) for name, width in CORNERS.items()}
@@ -50,18 +50,18 @@ def write_triangles(
     out, normals = arena.room((count,), Triangle.dtype), arena.room((smooth,), TriangleNormals.dtype)
     nodes = arena.room((node_count,), Node.dtype)
     corners = {name: arena.room(shape, _at_corner(name)) for name, shape in shapes.items()}
-    triangles.write(places, out[:own])
+    triangles.write(places, out[:start])
     if smooth:
-        triangles.write_normals(places, normals[:own])
+        triangles.write_normals(places, normals[:start])
     for name, values in corners.items():
         if len(values):
-            triangles.write_corners(name, places, values[:own])
+            triangles.write_corners(name, places, values[:start])
     written, node = list[SharedMesh](), 0
     for each in shared:
-        part = slice(own, own + each.count)
+        part = slice(start, start + each.count)
         nodes[node : node + len(each.nodes)] = each.nodes
         at = nodes[node : node + len(each.nodes)]
-        own, node = part.stop, node + len(at)
+        start, node = part.stop, node + len(at)
         mesh = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
         written.append(replace(mesh, nodes=at))
     return TriangleBuffers(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(
@@ -125,5 +125,5 @@ class Geometry:
     @property
     def triangle_buffers(self) -> TriangleBuffers:
         corners = self.triangle_uvs, self.triangle_uvs_1, self.triangle_colors
-        own = self.shapes[ShapeKind.TRIANGLE], self.triangle_normals, self.tangents
-        return TriangleBuffers(*own, *corners, self.instance_nodes)
+        arrays = self.shapes[ShapeKind.TRIANGLE], self.triangle_normals, self.tangents
+        return TriangleBuffers(*arrays, *corners, self.instance_nodes)

@@ -110,9 +110,9 @@ class SharedMesh:
             for name, values in corners.items():
                 if len(values):
                     source.triangles.write_corners(name, source.places, values)
-        own = {name: values for name, values in corners.items() if self.has(name)}
+        present = {name: values for name, values in corners.items() if self.has(name)}
         bits = self.any_smooth, self.any_tangents
-        return replace(self, source=WrittenTriangles(triangles, normals if any(bits) else None, *bits, own))
+        return replace(self, source=WrittenTriangles(triangles, normals if any(bits) else None, *bits, present))
 
 
 def shared_mesh(key: Hashable, mesh: PlacedMesh) -> SharedMesh | None:

@@ -90,9 +90,9 @@ def survey(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[Triangles, np.
     """The triangles that have an area, and the boxes (n, 6) float32 around them, in the order of the meshes."""
     points = [(mesh.vertices - origin).astype(np.float32) for mesh in meshes]
     valid, boxes, degenerate = list[np.ndarray | None](), [np.zeros((0, 6), np.float32)], dict[int, int]()
-    for mesh, own in zip(meshes, points, strict=True):
+    for mesh, vertices in zip(meshes, points, strict=True):
         found, flat = np.empty((len(mesh.faces), 6), np.float32), np.empty(len(mesh.faces), bool)
-        in_threads(partial(_survey, own, mesh.faces, found, flat), chunks(len(found)))
+        in_threads(partial(_survey, vertices, mesh.faces, found, flat), chunks(len(found)))
         lost = int(np.count_nonzero(flat))
         valid.append(np.flatnonzero(~flat) if lost else None)
         boxes.append(found[~flat] if lost else found)
@@ -164,13 +164,13 @@ class Triangles:
         smooth = [None if mesh.normals is None else _Smooth.of(mesh.normals) for mesh in self.meshes]
 
         def some(number: int, which: Rows, where: Rows) -> None:
-            mesh, own = self.meshes[number], smooth[number]
+            mesh, shading = self.meshes[number], smooth[number]
             record = np.zeros(_count(which), layout.TriangleNormals.dtype)
-            if own is not None or mesh.tangents is not None:
+            if shading is not None or mesh.tangents is not None:
                 a, b, c = self._corners(number, which)
                 across = np.cross(b - a, c - a)
-                if own is not None:
-                    own.fill(mesh.normal_faces[which], across, record)
+                if shading is not None:
+                    shading.fill(mesh.normal_faces[which], across, record)
                 else:
                     record["n0"] = record["n1"] = record["n2"] = encode(across)
                 if mesh.tangents is not None:

@@ -87,8 +87,8 @@ def _charted(
             rows[some], turned = _along(vertices.take(faces[some], axis=0), uvs.take(faces[some], axis=0))
             left[some] = turned < 0
         return Tangents(_small(rows), np.repeat(np.arange(len(faces), dtype=np.int32)[:, None], 3, axis=1), left)
-    own = [normals] if normal_faces is faces else []  # else there is one normal for each position
-    place = same(vertices, *own, uvs)
+    by_normal = [normals] if normal_faces is faces else []  # else there is one normal for each position
+    place = same(vertices, *by_normal, uvs)
     sums = np.zeros((3, 2 * (int(place.max(initial=-1)) + 1)))
     flat, left = np.empty(len(faces), bool), np.empty(len(faces), bool)
     for some in chunks(len(faces)):

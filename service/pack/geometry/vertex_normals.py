@@ -70,8 +70,10 @@ def split(faces: np.ndarray, groups: np.ndarray) -> tuple[np.ndarray, np.ndarray
     `groups` (m,) are those of the faces; a face of group 0 is a group by itself.
     """
     first = int(groups.max()) + 1
-    own = np.where(groups > 0, groups, first + np.arange(len(faces), dtype=np.int64))
-    keys, corners = np.unique(faces.astype(np.int64) * (first + len(faces)) + own[:, None], return_inverse=True)
+    face_groups = np.where(groups > 0, groups, first + np.arange(len(faces), dtype=np.int64))
+    keys, corners = np.unique(
+        faces.astype(np.int64) * (first + len(faces)) + face_groups[:, None], return_inverse=True
+    )
     which, group = np.divmod(keys, first + len(faces))
     return which, group, corners.reshape(-1, 3).astype(np.int32)
 

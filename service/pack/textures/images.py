@@ -73,15 +73,15 @@ def lay_out(
     """The texels of images, by `TextureReference.key`, and the mip levels of those that are in `averaged`."""
     allowed = MAX_TEXELS if limits is None else limits.max_texels
     room, device_room = allowed, MAX_TEXELS
-    for kept, (name, image) in wanted.items():
+    for stored, (name, image) in wanted.items():
         height, width = image.pixels.shape[:2]
-        whole = width * height + (level_texels(width, height) if kept in averaged else 0)
+        whole = width * height + (level_texels(width, height) if stored in averaged else 0)
         if width * height > room or whole > device_room:
             left = room if width * height > room else device_room
             detail = f"has {width} x {height} texels; this server has room for {left} more in a scene"
             raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
         room, device_room = room - width * height, device_room - whole
-    images = {kept: image for kept, (_, image) in wanted.items()}
+    images = {stored: image for stored, (_, image) in wanted.items()}
 
     def made() -> PackedTexels:
         takes("texels", _needed(images, averaged))
@@ -89,18 +89,18 @@ def lay_out(
 
     if cache is None or not images or not all(map(lasting, images)):
         return made()
-    key = tuple((kept, averaged.get(kept)) for kept in images)
+    key = tuple((stored, averaged.get(stored)) for stored in images)
     return cache.get(("texels", key), made)
 
 
 def _needed(images: Mapping[str, ImageData], averaged: Mapping[str, Texels]) -> int:
     """The bytes that laying out images takes, with what the levels of some take while they are made."""
     total, working = 0, [0] * AT_ONCE
-    for kept, image in images.items():
+    for stored, image in images.items():
         height, width, channels = image.pixels.shape
         texels, value = width * height, 1 if image.is_8bit else 4
-        total += 4 * value * texels + (value * channels * texels if kept.endswith(DECODED) else 0)
-        if kept in averaged:
+        total += 4 * value * texels + (value * channels * texels if stored.endswith(DECODED) else 0)
+        if stored in averaged:
             total += 4 * value * level_texels(width, height)
             working.append((LEVELS_8BIT if image.is_8bit else LEVELS_FLOAT) * texels)
     return total + sum(sorted(working)[-AT_ONCE:])
@@ -109,18 +109,18 @@ def _needed(images: Mapping[str, ImageData], averaged: Mapping[str, Texels]) -> 
 def _laid(images: dict[str, ImageData], averaged: Mapping[str, Texels]) -> PackedTexels:
     places: dict[str, tuple[int, ImageData]] = {}
     ends = {True: 0, False: 0}
-    for kept, image in images.items():
+    for stored, image in images.items():
         height, width = image.pixels.shape[:2]
-        places[kept] = ends[image.is_8bit], _decoded(image) if kept.endswith(DECODED) else image
-        ends[image.is_8bit] += width * height + (level_texels(width, height) if kept in averaged else 0)
+        places[stored] = ends[image.is_8bit], _decoded(image) if stored.endswith(DECODED) else image
+        ends[image.is_8bit] += width * height + (level_texels(width, height) if stored in averaged else 0)
     out: dict[bool, np.ndarray] = {
         True: np.empty((ends[True], 4), np.uint8),
         False: np.empty((ends[False], 4), np.float32),
     }
     with ThreadPoolExecutor(AT_ONCE) as pool:
         for done in [
-            pool.submit(_fill, out[image.is_8bit][first:], image, averaged.get(kept))
-            for kept, (first, image) in places.items()
+            pool.submit(_fill, out[image.is_8bit][first:], image, averaged.get(stored))
+            for stored, (first, image) in places.items()
         ]:
             done.result()
     return PackedTexels(out[True], out[False], places, averaged)

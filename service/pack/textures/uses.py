@@ -120,8 +120,10 @@ def _uv_set(scene: Scene, reference: Reference) -> int | None:
 def _tangent_set(scene: Scene, material: Material, sets: Mapping[str, int | None]) -> int | None:
     """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic. Of a
     projected normal map kernels know the directions without a chart."""
-    own = {key for key, reference in references(material).items() if is_projected(_read(scene, reference.texture)[1])}
-    by_member = {member_of(material, key): uv_set for key, uv_set in sets.items() if key not in own}
+    projected = {
+        key for key, reference in references(material).items() if is_projected(_read(scene, reference.texture)[1])
+    }
+    by_member = {member_of(material, key): uv_set for key, uv_set in sets.items() if key not in projected}
     for name in texture_records.NORMALS:
         if name in by_member:
             return by_member[name] or 0

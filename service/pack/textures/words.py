@@ -45,14 +45,16 @@ def pack_textures(
     used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.name for use in uses if isinstance(use.texture, ImageTexture)}
     averaged = {use.key: use.averaged for use in uses if isinstance(use.texture, ImageTexture) and use.averaged}
-    texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, averaged, cache, limits)
+    texels = lay_out(
+        {stored: (wanted[asset], images[asset]) for stored, asset in used.items()}, averaged, cache, limits
+    )
     if not uses:
         return None, uses, texels, []
     slots = _slots(uses)
     stops = room_for_stops(uses)
     words = _words(len(drawn.materials), uses, slots, texels, stops)
     write_uses(words, drawn, slots)
-    key = " ".join(f"{kept}@{first}:{averaged.get(kept)}" for kept, (first, _) in texels.places.items())
+    key = " ".join(f"{stored}@{first}:{averaged.get(stored)}" for stored, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key, stops)
     return arrays, uses, texels, [*_image_warnings(wanted, images), *_warnings(uses, texels)]
@@ -143,8 +145,8 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
 
 
 def _projection(mapping: str) -> int:
-    own = texture_records.SLOT_PROJECTED
-    return {"uv": 0, "box": own, "sphere": own | texture_records.SLOT_ROUND}[mapping]
+    projected = texture_records.SLOT_PROJECTED
+    return {"uv": 0, "box": projected, "sphere": projected | texture_records.SLOT_ROUND}[mapping]
 
 
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
@@ -206,10 +208,10 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
         if isinstance(use.reference, NormalTexture):
             if use not in flat:
                 continue
-            own = getattr(use.texture, "uv", 0)
-            along = charts.get(use.material, own)
-            if own != along:
-                yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
+            uv_set = getattr(use.texture, "uv", 0)
+            along = charts.get(use.material, uv_set)
+            if uv_set != along:
+                yield f"{use.pointer}: reads uv set {uv_set}, but runs along set {along}, that of the normal map"
             continue
         if isinstance(use.reference, HeightTexture):
             continue

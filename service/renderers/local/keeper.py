@@ -15,7 +15,7 @@ from service.problems import Unavailable
 from service.renderers.local.process import Cause, RendererProcess, Start, Waiting
 from service.renderers.local.restarts import Restarts
 from service.renderers.protocol import State
-from service.renderers.statistics import Held, Statistics
+from service.renderers.statistics import RendererLoad, Statistics
 from service.system.background import Background, Died, reported
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
@@ -214,7 +214,7 @@ class Keeper:
         cause = await process.end(LAST_WORDS_S)
         self.restarts.lost(process, cause)
         self._statistics.restarts[cause] += 1
-        self._statistics.held = Held()  # of its memory as well, which others may wait for
+        self._statistics.load = RendererLoad()  # of its memory as well, which others may wait for
         level = logging.INFO if cause == "released" else logging.ERROR
         log.log(
             level,

@@ -260,8 +260,8 @@ def _spawn(
 
 
 def _environment(options: Options) -> dict[str, str]:
-    own = inherited_environment()
-    return own if options.cores is None else own | dict.fromkeys(THREADS, str(options.cores))
+    inherited = inherited_environment()
+    return inherited if options.cores is None else inherited | dict.fromkeys(THREADS, str(options.cores))
 
 
 async def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:

@@ -40,7 +40,7 @@ from service.renderers.local.process import Cause, Options, Process, RendererPro
 from service.renderers.local.restarts import BY_OTHERS
 from service.renderers.protocol import Listener, Member, Place
 from service.renderers.replay_log import ReplayLog
-from service.renderers.statistics import Held, Kind, Statistics
+from service.renderers.statistics import Kind, RendererLoad, Statistics
 from service.renderers.task import Task
 from service.system.background import reported
 from service.system.executors import sending, tending
@@ -186,7 +186,7 @@ class Supervisor:
             return
         if isinstance(message, EvaluateBsdf):
             message = replace(message, client=task.client)
-        task.record.told(message)
+        task.record.note(message)
         if task.resident:
             self._keeper.send(message)
         elif isinstance(message, Read):
@@ -210,13 +210,13 @@ class Supervisor:
             channel.discard(encoded)
             return False
         if update.scene is None:
-            task.record.told(update)
+            task.record.note(update)
             if task.resident:
                 self._keeper.send_encoded(encoded)
             else:
                 channel.discard(encoded)
             return True
-        task.record.scene_told(update, encoded)
+        task.record.note_scene(update, encoded)
         if restore is None:
             self._keeper.send_encoded(encoded)
             return True
@@ -268,9 +268,11 @@ class Supervisor:
 
     async def _bring_back(self, number: int, task: Task) -> None:
         """Send the process a picture that it does not have, to go on with it or to read it."""
-        process, kept = self._keeper.process, task.record.kept
+        process, stored_picture = self._keeper.process, task.record.stored_picture
         try:
-            encoded = await tending(lambda: channel.encode(kept() if callable(kept) else kept))
+            encoded = await tending(
+                lambda: channel.encode(stored_picture() if callable(stored_picture) else stored_picture)
+            )
         except Exception as error:
             return self._lose_picture(number, task, error)
         if task.resident or process is None or process is not self._keeper.process or number not in self.tasks:
@@ -303,15 +305,15 @@ class Supervisor:
 
     def _begin_again(self, number: int, task: Task) -> None:
         """Send a process that does not know the task all that it needs."""
-        task.resident = task.record.kept is None
+        task.resident = task.record.stored_picture is None
         if task.resident:
             self._replay(number, task.record)
             task.listener.again()
         elif task.record.saved is None or task.record.reads:
             self._bring_back_soon(number, task)
 
-    def _replay(self, number: int, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
-        for message in record.again(kept):
+    def _replay(self, number: int, record: ReplayLog, picture: channel.Encoded | None = None) -> None:
+        for message in record.again(picture):
             if isinstance(message, tuple):
                 self._keeper.send_encoded(message)
             else:
@@ -367,7 +369,7 @@ class Supervisor:
     def _account(self, usage: Usage) -> None:
         statistics = self.statistics
         statistics.samples += usage.samples
-        statistics.held = Held(usage.tasks, usage.bytes, usage.resting, usage.kernels)
+        statistics.load = RendererLoad(usage.tasks, usage.bytes, usage.resting, usage.kernels)
         statistics.kernels_evicted += usage.evicted
         for number, seconds in usage.gpu_s.items():
             task = self.tasks.get(number)

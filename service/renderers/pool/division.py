@@ -61,106 +61,106 @@ class Division:
 
     def leave(self, task: int) -> None:
         """End all assistance for a task that is about to move: one of its assistants may be its next home."""
-        if (held := self._tasks.get(task)) is not None:
-            self._leave(task, held)
+        if (entry := self._tasks.get(task)) is not None:
+            self._leave(task, entry)
 
     def moved(self, task: int, home: int) -> None:
         """Another renderer goes on with this task, after `leave`."""
-        if (held := self._tasks.get(task)) is not None:
-            held.home = home
+        if (entry := self._tasks.get(task)) is not None:
+            entry.home = home
             self.assign()
 
     def dropped(self, task: int) -> None:
-        held = self._tasks.pop(task, None)
-        if held is not None:
-            for each in held.assistants:
+        entry = self._tasks.pop(task, None)
+        if entry is not None:
+            for each in entry.assistants:
                 self._peers[each].relay(Drop(task))
             self.assign()
 
     def divide(self, task: int, most: int | None) -> None:
         """Let at most so many renderers trace the task; None: all that are free."""
-        if (held := self._tasks.get(task)) is not None and held.most != most:
-            held.most = most
+        if (entry := self._tasks.get(task)) is not None and entry.most != most:
+            entry.most = most
             self.assign()
 
     def renderers(self, task: int) -> int:
         """How many trace this task."""
-        held = self._tasks.get(task)
-        return 1 + len(held.assistants) if held is not None and held.active else 0
+        entry = self._tasks.get(task)
+        return 1 + len(entry.assistants) if entry is not None and entry.active else 0
 
     def sent(self, message: ToRenderer) -> None:
         """Note what was sent to a task's home, and tell those that assist it."""
-        held = self._tasks.get(message.task)
-        if held is None:
+        entry = self._tasks.get(message.task)
+        if entry is None:
             return
         if isinstance(message, Update):
-            self._updated(message, held)
-            for each in held.assistants:
+            self._updated(message, entry)
+            for each in entry.assistants:
                 self._peers[each].relay(message)
             self.assign()
         elif isinstance(message, Pause | Resume | Stop):
-            held.active = isinstance(message, Resume) and not held.ended
+            entry.active = isinstance(message, Resume) and not entry.ended
             self.assign()
 
     def scene_sent(self, update: Update, ended: bool = False) -> None:
         """The home was sent a whole scene: so are the others. `ended`: with its finished picture."""
-        if (held := self._tasks.get(update.task)) is not None:
-            held.unfit = frozenset()
-            self._updated(update, held)
-            held.active, held.ended = not ended, ended
-            for each in held.assistants:
-                self._tell_scene(update.task, held, each)
+        if (entry := self._tasks.get(update.task)) is not None:
+            entry.unfit = frozenset()
+            self._updated(update, entry)
+            entry.active, entry.ended = not ended, ended
+            for each in entry.assistants:
+                self._tell_scene(update.task, entry, each)
             self.assign()
 
-    def _updated(self, update: Update, held: _Task) -> None:
-        held.active, held.ended = True, False
+    def _updated(self, update: Update, entry: _Task) -> None:
+        entry.active, entry.ended = True, False
         if update.settings is not None:
-            held.adaptive = bool(update.settings.get("adaptive"))
+            entry.adaptive = bool(update.settings.get("adaptive"))
         if update.stop is not None:
-            held.time_limit = update.stop.time_limit
+            entry.time_limit = update.stop.time_limit
 
     def heard(self, message: Heard) -> None:
         """Note what a task's home has said."""
-        held = self._tasks.get(message.task)
-        if held is None:
+        entry = self._tasks.get(message.task)
+        if entry is None:
             return
         if isinstance(message, Done):
-            held.active, held.ended = False, True
+            entry.active, entry.ended = False, True
             self.assign()
         elif isinstance(message, Failed) and message.serial is None:
-            held.active = message.fallback is not None
-            self._leave(message.task, held)  # assistants may hold a newer scene
+            entry.active = message.fallback is not None
+            self._leave(message.task, entry)  # assistants may hold a newer scene
             self.assign()
 
-    def told(self, task: int) -> None:
+    def replayed(self, task: int) -> None:
         """A new process of the home has been told of the task: what the old one leased is forgotten there."""
-        held = self._tasks.get(task)
-        if held is not None and held.assistants:
-            self._peers[held.home].relay(Assistants(task, held.assistants))
+        entry = self._tasks.get(task)
+        if entry is not None and entry.assistants:
+            self._peers[entry.home].relay(Assistants(task, entry.assistants))
 
-    def handed(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted, sender: int) -> None:
+    def forward(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted, sender: int) -> None:
         """Hand on what the home and its assistants say to each other."""
-        held = self._tasks.get(message.task)
-        if held is None:
+        entry = self._tasks.get(message.task)
+        if entry is None:
             return
         if isinstance(message, Lease):
-            if message.assistant in held.assistants:
+            if message.assistant in entry.assistants:
                 self._peers[message.assistant].leases["given"] += 1
                 self._peers[message.assistant].relay(message)
         elif isinstance(message, LeaseRefuted):
-            if sender == held.home:
+            if sender == entry.home:
                 self._refuted(message)
-        elif sender not in held.assistants:
+        elif sender not in entry.assistants:
             return
         elif isinstance(message, LeaseDone):
             self._peers[sender].leases["done"] += 1
-            self._peers[held.home].relay(message)
+            self._peers[entry.home].relay(message)
         else:
             self._peers[sender].leases["failed"] += 1
             log.warning(
                 "a renderer cannot assist", {"task": message.task, "renderer": sender, "error": message.detail}
             )
-            held.unfit |= {sender}
+            entry.unfit |= {sender}
             self.assign()
 
     def _refuted(self, message: LeaseRefuted) -> None:
@@ -175,47 +175,46 @@ class Division:
 
     def assign(self) -> None:
         """Choose anew which renderer assists which; to be called when one has come, gone or changed."""
-        tasks = [
-            held for held in self._tasks.values() if held.active and undivided(held.adaptive, held.time_limit) is None
-        ]
-        busy = {held.home for held in self._tasks.values() if held.active}
+        active = [entry for entry in self._tasks.values() if entry.active]
+        tasks = [entry for entry in active if undivided(entry.adaptive, entry.time_limit) is None]
+        busy = {entry.home for entry in active}
         free = [n for n, peer in enumerate(self._peers) if n not in busy | self._wrong and peer.driver is not None]
-        chosen: dict[int, list[int]] = {id(held): [] for held in tasks}
+        chosen: dict[int, list[int]] = {id(entry): [] for entry in tasks}
         share = -(-len(free) // max(1, len(tasks)))
-        for held in tasks:  # assistants go on, as far as they are still wanted
-            for each in held.assistants[:share]:
-                if each in free and self._wants(held, each, chosen[id(held)]):
-                    chosen[id(held)].append(each)
+        for entry in tasks:  # assistants go on, as far as they are still wanted
+            for each in entry.assistants[:share]:
+                if each in free and self._wants(entry, each, chosen[id(entry)]):
+                    chosen[id(entry)].append(each)
                     free.remove(each)
         for each in free:
-            wanting = [held for held in tasks if self._wants(held, each, chosen[id(held)])]
+            wanting = [entry for entry in tasks if self._wants(entry, each, chosen[id(entry)])]
             if wanting:
-                chosen[id(min(wanting, key=lambda held: len(chosen[id(held)])))].append(each)
-        for task, held in self._tasks.items():
-            self._set(task, held, tuple(chosen.get(id(held), [])))
+                chosen[id(min(wanting, key=lambda entry: len(chosen[id(entry)])))].append(each)
+        for task, entry in self._tasks.items():
+            self._set(task, entry, tuple(chosen.get(id(entry), [])))
 
-    def _wants(self, held: _Task, renderer: int, others: Sequence[int]) -> bool:
-        same = self._peers[held.home].driver == self._peers[renderer].driver
-        return same and renderer not in held.unfit and (held.most is None or 1 + len(others) < held.most)
+    def _wants(self, entry: _Task, renderer: int, others: Sequence[int]) -> bool:
+        same = self._peers[entry.home].driver == self._peers[renderer].driver
+        return same and renderer not in entry.unfit and (entry.most is None or 1 + len(others) < entry.most)
 
-    def _set(self, task: int, held: _Task, assistants: tuple[int, ...]) -> None:
-        if assistants == held.assistants:
+    def _set(self, task: int, entry: _Task, assistants: tuple[int, ...]) -> None:
+        if assistants == entry.assistants:
             return
-        before, held.assistants = held.assistants, assistants
+        before, entry.assistants = entry.assistants, assistants
         for each in before:
             if each not in assistants:
                 self._peers[each].relay(Drop(task))
         for each in assistants:
             if each not in before:
                 self._peers[each].relay(Assist(task))
-                self._tell_scene(task, held, each)
-        self._peers[held.home].relay(Assistants(task, assistants))
+                self._tell_scene(task, entry, each)
+        self._peers[entry.home].relay(Assistants(task, assistants))
 
-    def _leave(self, task: int, held: _Task) -> None:
-        self._set(task, held, ())
+    def _leave(self, task: int, entry: _Task) -> None:
+        self._set(task, entry, ())
 
-    def _tell_scene(self, task: int, held: _Task, assistant: int) -> None:
-        for message in self._peers[held.home].scene_of(task):
+    def _tell_scene(self, task: int, entry: _Task, assistant: int) -> None:
+        for message in self._peers[entry.home].scene_of(task):
             if isinstance(message, tuple):
                 self._peers[assistant].relay_encoded(message)
             else:

@@ -235,8 +235,8 @@ class Pool:
     def _kind_of(self, task: int) -> Kind:
         """The kind of a task that a renderer assists."""
         home = self.homes.get(task)
-        held = None if home is None else home.tasks.get(task)
-        return "server" if held is None else held.kind
+        task_record = None if home is None else home.tasks.get(task)
+        return "server" if task_record is None else task_record.kind
 
 
 class _Seated(Events):
@@ -258,10 +258,10 @@ class _Seated(Events):
         self._pool._division.heard(message)
 
     def leased(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted) -> None:
-        self._pool._division.handed(message, self._number)
+        self._pool._division.forward(message, self._number)
 
     def replayed(self, task: int) -> None:
-        self._pool._division.told(task)
+        self._pool._division.replayed(task)
 
     def kind_of(self, task: int) -> Kind:
         return self._pool._kind_of(task)
@@ -280,8 +280,8 @@ class _Peer:
         return None if self._supervisor.info is None else self._supervisor.driver
 
     def scene_of(self, task: int) -> list[Encoded | ToRenderer]:
-        held = self._supervisor.tasks.get(task)
-        return [] if held is None else held.record.scenes()
+        task_record = self._supervisor.tasks.get(task)
+        return [] if task_record is None else task_record.record.scenes()
 
 
 def _load(kind: Kind, client: str) -> Callable[[Supervisor], tuple[int, ...]]:
@@ -292,7 +292,7 @@ def _load(kind: Kind, client: str) -> Callable[[Supervisor], tuple[int, ...]]:
         if kind == "render":
             return sum(task.kind == "render" for task in active), len(active)
         # What a client's other tasks need is likely to be there already: kernels, above all.
-        own = sum(bool(client) and task.client == client for task in supervisor.tasks.values())
-        return len(active), -own
+        of_client = sum(bool(client) and task.client == client for task in supervisor.tasks.values())
+        return len(active), -of_client
 
     return load

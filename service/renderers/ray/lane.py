@@ -62,7 +62,7 @@ class Lane:
         self.number, self._actors = number, actors
         self._incoming: deque[ToRenderer] = deque()
         self._news = asyncio.Event()
-        self._held: dict[int, list[ToRenderer]] = {}  # by task, behind a large message of it that is under way
+        self._behind: dict[int, list[ToRenderer]] = {}  # by task, behind a large message of it that is under way
         self._tasks: set[int] = set()
         self._paused = False
         self._loss = "node lost"  # why, when the actor is lost
@@ -179,10 +179,10 @@ class Lane:
             together, large = list[ToRenderer](), list[ToRenderer]()
             while self._incoming:
                 message = self._incoming.popleft()
-                if message.task in self._held:
-                    self._held[message.task].append(message)
+                if message.task in self._behind:
+                    self._behind[message.task].append(message)
                 elif (isinstance(message, Update) and message.scene is not None) or size(message) >= LARGE:
-                    self._held[message.task] = []
+                    self._behind[message.task] = []
                     large.append(message)
                 else:
                     together.append(message)
@@ -201,7 +201,7 @@ class Lane:
         """An error of the server kept a large message from the renderer; what waits behind it goes on."""
         if isinstance(message, Update):
             self._link.send(Failed(message.task, message.generation, MISTAKE))
-        self._incoming.extendleft(reversed(self._held.pop(message.task, [])))
+        self._incoming.extendleft(reversed(self._behind.pop(message.task, [])))
         self._news.set()
 
     def _note(self, messages: list[ToRenderer]) -> None:
@@ -221,7 +221,7 @@ class Lane:
                 await _answer(actor.take_large.remote(replace(message, scene=None), scene))
             else:
                 await _answer(actor.take_large.remote(await stored(message), None))
-        self._incoming.extendleft(reversed(self._held.pop(message.task)))
+        self._incoming.extendleft(reversed(self._behind.pop(message.task)))
         self._news.set()
 
     async def _hear_all(self, actor: Any) -> Ended:

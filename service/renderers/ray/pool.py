@@ -69,9 +69,9 @@ class ClusterPool(Pool):
         self._busy_since = None
         if now - self._idle_since >= IDLE_S:
             awake = [number for number in range(self._count) if number not in self._cluster.resting]
-            kept = next((number for number in awake if self.supervisors[number].info is not None), awake[0])
+            stays = next((number for number in awake if self.supervisors[number].info is not None), awake[0])
             for number in awake:
-                if number != kept:
+                if number != stays:
                     self._cluster.rest(number)
 
 

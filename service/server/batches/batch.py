@@ -267,11 +267,11 @@ class Members:
         member = Order(
             member_id(self._batch.id, step), order.owner, settings, label, order.priority, order.created_at
         )
-        kept = None if stored else await packing(partial(folded, document["scene"]), self._batch.client)
+        base = None if stored else await packing(partial(folded, document["scene"]), self._batch.client)
         try:
-            return self._new_job(member, kept, packed)
+            return self._new_job(member, base, packed)
         except TooLarge:
-            return self._new_job(member, kept, None)
+            return self._new_job(member, base, None)
 
     def _check(self) -> None:
         document = self._variations.document(0)

@@ -94,12 +94,12 @@ def _places(things: Iterable[Thing], saved: Iterable[Thing], kind: str) -> dict[
     """Where in the scene the things of the file are, by their keys. One without a name is the file's where it has the
     mesh of one at rest."""
     known, files = {thing.get("name", "") for thing in saved}, {thing.get("asset") for thing in saved}
-    own = [
+    in_scene = [
         (i, thing)
         for i, thing in enumerate(things)
         if (thing["name"] in known if "name" in thing else kind == "shapes" and thing.get("asset") in files)
     ]
-    return dict(zip(_keys((thing for _, thing in own)), (i for i, _ in own), strict=True))
+    return dict(zip(_keys((thing for _, thing in in_scene)), (i for i, _ in in_scene), strict=True))
 
 
 def _moved(things: list[Thing], here: dict[tuple[str, int], int], posed: list[Thing], kind: str) -> dict[str, Thing]:

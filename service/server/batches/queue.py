@@ -65,9 +65,9 @@ class BatchQueue:
 
     def _check_number(self, batch: Batch) -> None:
         """Raise TooManyRequests where an owner's batches have more renders than are kept once they have ended."""
-        others, kept = self._under_way(batch.owner), self._renders.limits.retention.kept
-        if others and batch.counts_as + sum(each.counts_as for each in others) > kept:
-            renders, most = sum(each.order.renders for each in others), kept * RENDERS_OF_ONE
+        others, limit = self._under_way(batch.owner), self._renders.limits.retention.most_renders
+        if others and batch.counts_as + sum(each.counts_as for each in others) > limit:
+            renders, most = sum(each.order.renders for each in others), limit * RENDERS_OF_ONE
             detail = (
                 f"{renders} renders of your batches are under way, and with these there would be more than {most}"
             )
@@ -203,8 +203,8 @@ class BatchQueue:
             {"id": member_id(batch.id, step)[:6], "step": step, "error": error},
             exc_info=error if unexpected else None,
         )
-        told = error if isinstance(error, ServiceError) else Internal(MISTAKE)
-        job = self._made_ended(batch.member(step), Outcome().failed(told, time.time()))
+        problem = error if isinstance(error, ServiceError) else Internal(MISTAKE)
+        job = self._made_ended(batch.member(step), Outcome().failed(problem, time.time()))
         try:
             await self._wait_for_room(job, batch, step)
         except Exception:

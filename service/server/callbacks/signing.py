@@ -37,10 +37,10 @@ def secrets_of(config: Config) -> list[str]:
 
     Raises Unavailable where the disk fails.
     """
-    return config.callback_secret or [_kept(config.data_dir)]
+    return config.callback_secret or [_stored(config.data_dir)]
 
 
-def _kept(folder: Path) -> str:
+def _stored(folder: Path) -> str:
     path = folder / FILE
     try:
         if not path.exists():

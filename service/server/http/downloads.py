@@ -57,11 +57,11 @@ class Pieces:
 
 
 class FileAnswer(Response):
-    """The bytes of an open file, which need not have a name. A reference to `held` lasts until the answer's end."""
+    """The bytes of an open file, which need not have a name. A reference to `source` lasts until the answer's end."""
 
-    def __init__(self, file: BinaryIO, media_type: str, headers: Mapping[str, str], held: object = None) -> None:
+    def __init__(self, file: BinaryIO, media_type: str, headers: Mapping[str, str], source: object = None) -> None:
         self._file = file
-        self._held = held
+        self._source = source
         self._size = os.fstat(file.fileno()).st_size
         super().__init__(None, media_type=media_type, headers={**headers, "content-length": str(self._size)})
 
@@ -77,7 +77,7 @@ class FileAnswer(Response):
                 await send({"type": "http.response.body", "body": data, "more_body": sent < self._size})
                 if sent >= self._size:
                     break
-        self._held = None
+        self._source = None
 
 
 @asynccontextmanager
@@ -99,16 +99,16 @@ async def disconnected(receive: Receive) -> None:
 
 class Written:
     """A picture's file, on the disk or in memory. It has no name, and is deleted with the last reference to this
-    object, as its memory is released with that to `held`."""
+    object, as its memory is released with that to `source`."""
 
-    def __init__(self, file: BinaryIO, held: object = None) -> None:
-        self.file, self._held = file, held
+    def __init__(self, file: BinaryIO, source: object = None) -> None:
+        self.file, self._source = file, source
         self.bytes = os.fstat(file.fileno()).st_size
 
     @property
     def is_modest(self) -> bool:
         """True if as many as stay would leave room for others."""
-        return self.bytes <= (SMALL if self._held is not None else ROOM // (2 * LASTING))
+        return self.bytes <= (SMALL if self._source is not None else ROOM // (2 * LASTING))
 
 
 class Downloads:

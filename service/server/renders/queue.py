@@ -17,7 +17,7 @@ from service.server.renders.documents import WaitingDocuments
 from service.server.renders.followers import Follower, Followers
 from service.server.renders.recorder import Recorder
 from service.server.renders.render import InBatch, Render
-from service.server.renders.retention import KeptRenders, QueueLimits, Resting, forget, in_memory, settle, take_up
+from service.server.renders.retention import QueueLimits, Resting, RetainedRenders, forget, in_memory, settle, take_up
 from service.server.renders.scene import PackedScenes
 from service.server.renders.slots import Slots
 from service.server.renders.store.batch_rows import BatchOrder
@@ -52,7 +52,7 @@ class RenderQueue:
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._documents = WaitingDocuments(self.limits.disk_bytes)
-        self._kept: KeptRenders[Render | InBatch] = KeptRenders(self.limits.retention)
+        self._retained: RetainedRenders[Render | InBatch] = RetainedRenders(self.limits.retention)
         self.resting = Resting()
         self._chores = Background()
         self._timer: asyncio.TimerHandle | None = None
@@ -91,9 +91,9 @@ class RenderQueue:
                 self._documents.count(job, job.order.bytes)
         for job in sorted(self._jobs.values(), key=lambda job: job.ended_at):
             if job.finished.is_set() and job.batch is None:
-                self._kept.add(job)
+                self._retained.add(job)
         if self._jobs:
-            log.info("took up stored renders", {"waiting": len(self._waiting), "ended": self.kept})
+            log.info("took up stored renders", {"waiting": len(self._waiting), "ended": self.retained})
         self._evict()
         self._slots.dispatch()
 
@@ -156,14 +156,14 @@ class RenderQueue:
         """Raise what `submit` would raise, before a scene is read for nothing."""
         if self.closing:
             raise Unavailable("The server is shutting down.", RETRY_S)
-        own = self._waiting.count(owner) + self._storing[owner]
-        active = own + sum(job.owner == owner for job in self._slots.running)
+        theirs = self._waiting.count(owner) + self._storing[owner]
+        active = theirs + sum(job.owner == owner for job in self._slots.running)
         if active >= self.limits.each:
             detail = f"{active} renders of yours are under way: no more than {self.limits.each} (SUNBOX_MAX_JOBS)"
             raise TooManyRequests(detail, RETRY_S)
         # A queue that is full still takes renders of owners with less than their share of it.
-        share = self.limits.waiting // max(1, len(self._waiting.owners) + (own == 0))
-        if self.queued >= self.limits.waiting and own >= share:
+        share = self.limits.waiting // max(1, len(self._waiting.owners) + (theirs == 0))
+        if self.queued >= self.limits.waiting and theirs >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 
     def get(self, id: str, owner: str = "") -> Render:
@@ -219,8 +219,8 @@ class RenderQueue:
         return len(self._slots.running)
 
     @property
-    def kept(self) -> int:
-        return len(self._kept)
+    def retained(self) -> int:
+        return len(self._retained)
 
     def _know(self, job: Render) -> None:
         """Find it by its id from now on, and its picture where memory is taken from."""
@@ -277,7 +277,7 @@ class RenderQueue:
             try:
                 return await insert()
             except QuotaUsedUp:
-                goes, missing = self._kept.take_for(missing), 2 * missing
+                goes, missing = self._retained.take_for(missing), 2 * missing
                 if not goes:
                     raise
                 await forget(self._drop(goes), self.store)
@@ -291,7 +291,7 @@ class RenderQueue:
         self._documents.release(job)
         if job.finished.is_set() and job.id in self._jobs:
             if job.batch is None:
-                self._kept.add(job)
+                self._retained.add(job)
             else:
                 job.batch.ended(job)
                 self._chores.start("end of a render", settle(job, job.batch, self._jobs))
@@ -309,12 +309,12 @@ class RenderQueue:
         """Count what is stored of a cancelled render, once it is."""
         await job.recorded()
         if job.id in self._jobs and job.batch is None:
-            self._kept.add(job)
+            self._retained.add(job)
 
     def keep(self, batch: InBatch) -> None:
         """Its last render has ended: from now on it may make room for others."""
         self._documents.release(batch)
-        self._kept.add(batch)
+        self._retained.add(batch)
         self._evict()
 
     async def store_batch(
@@ -334,7 +334,7 @@ class RenderQueue:
         """Forget a batch that has ended, and its pictures. Raises Unavailable where the disk fails."""
         for job in list(batch.jobs.values()):  # which leave it meanwhile
             await job.recorded()
-        self._kept.remove(batch)
+        self._retained.remove(batch)
         await forget(self._drop([batch]), self.store)
 
     async def delete(self, job: Render) -> None:
@@ -345,20 +345,20 @@ class RenderQueue:
             await job.recorder.close()
             await self.store.forget([(job.recorder.number, job.id)])
         if job.id in self._jobs:
-            self._kept.remove(job)
+            self._retained.remove(job)
             self._drop([job])
 
     def _evict(self) -> None:
         if self.closing:
             return
         now = time.monotonic()
-        if stored := self._drop(self._kept.take_superfluous(now)):
+        if stored := self._drop(self._retained.take_superfluous(now)):
             self._chores.start("deletion of renders", forget(stored, self.store))
         # So that room is made also when no more requests come.
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if (left_s := self._kept.left_s(now)) is not None:
+        if (left_s := self._retained.left_s(now)) is not None:
             self._timer = asyncio.get_running_loop().call_later(min(EVICTION_S, left_s + 1.0), self._evict)
 
     def _drop(self, goes: Collection[Render | InBatch]) -> list[Recorder | InBatch]:

@@ -33,9 +33,9 @@ log = logging.getLogger(__name__)
 class Retention:
     """Limits on the ended renders that are stored."""
 
-    kept: int  # renders of each owner, of those of batches ten times as many
-    kept_bytes: int  # of the pictures and documents of all of them
-    kept_s: float  # after a render's end
+    most_renders: int  # renders of each owner, of those of batches ten times as many
+    most_bytes: int  # of the pictures and documents of all of them
+    longest_s: float  # after a render's end
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class QueueLimits:
     disk_bytes: int | None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
 
 
-class Kept(Protocol):
+class Retained(Protocol):
     @property
     def owner(self) -> str: ...
 
@@ -65,10 +65,10 @@ class Kept(Protocol):
         """The number that it counts as among its owner's stored renders."""
 
 
-T = TypeVar("T", bound=Kept)
+T = TypeVar("T", bound=Retained)
 
 
-class KeptRenders(Generic[T]):
+class RetainedRenders(Generic[T]):
     """The ended renders within their bounds. What happens at an end does not grow with their number."""
 
     def __init__(self, bounds: Retention) -> None:
@@ -108,11 +108,11 @@ class KeptRenders(Generic[T]):
         large they are."""
         goes, bounds = list[T](), self._bounds
         for owner, line in list(self._lines.items()):
-            while line and now - (first := next(iter(line))).ended_at >= bounds.kept_s:
+            while line and now - (first := next(iter(line))).ended_at >= bounds.longest_s:
                 goes.append(self._take(first))
-            while len(line) > 1 and self._renders[owner] > bounds.kept:
+            while len(line) > 1 and self._renders[owner] > bounds.most_renders:
                 goes.append(self._take(next(iter(line))))
-        return goes + self._take_largest(self._bytes.total() - bounds.kept_bytes)
+        return goes + self._take_largest(self._bytes.total() - bounds.most_bytes)
 
     def take_for(self, size: int) -> list[T]:
         """Remove as many as take so many bytes, but for the newest one."""
@@ -121,7 +121,7 @@ class KeptRenders(Generic[T]):
     def left_s(self, now: float) -> float | None:
         """Seconds until the next one is old; None where there is none."""
         ends = [next(iter(line)).ended_at for line in self._lines.values()]
-        return max(0.0, min(ends) + self._bounds.kept_s - now) if ends else None
+        return max(0.0, min(ends) + self._bounds.longest_s - now) if ends else None
 
     def _take_largest(self, size: int) -> list[T]:
         """Oldest renders of the owner that stores most, until `size` bytes are freed; not those of another owner of

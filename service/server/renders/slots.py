@@ -151,14 +151,14 @@ class Slots:
 
     def _fits(self, job: Render) -> bool:
         """True if it may begin now; its memory is counted then."""
-        if job in self._tried or self._held_back(job) or not self._in_share(job):
+        if job in self._tried or self._yields_memory(job) or not self._in_share(job):
             return False
         if job.reserve():
             return True
         self._lack(job)
         return False
 
-    def _held_back(self, job: Render) -> bool:
+    def _yields_memory(self, job: Render) -> bool:
         """True while a large render is waiting for memory that this one would use: no stream of renders starves it.
 
         Only for half of the time, as what that one waits for may be endless."""
@@ -171,8 +171,8 @@ class Slots:
         if job.lasting or not job.owner:
             return True
         fixed = Counter(each.owner for each in self._running.values() if not each.lasting)
-        own, others = fixed[job.owner], fixed.total() - fixed[job.owner]
-        return own == 0 or 2 * own < self._most - others
+        theirs, others = fixed[job.owner], fixed.total() - fixed[job.owner]
+        return theirs == 0 or 2 * theirs < self._most - others
 
     def _make_way(self) -> None:
         """Have others give way to a render that has waited for long, if that is fair."""
@@ -276,12 +276,12 @@ def giving_way(waiting: T, running: Sequence[T], free: int, lacks: int) -> list[
     left = [each for each in running if each.can_give_way]
     chosen: list[T] = []
     while lacks > 0 or not (free or chosen):
-        own = counts[waiting.client]
+        theirs = counts[waiting.client]
         most = max((counts[each.client] for each in left), default=0)
-        if most > own + 1:
+        if most > theirs + 1:
             rich = [each for each in left if counts[each.client] == most]
             gives = max(rich, key=lambda each: (-each.priority, each.place))
-        elif own == 0 and (long := [each for each in left if _had_enough(each, waiting)]):
+        elif theirs == 0 and (long := [each for each in left if _had_enough(each, waiting)]):
             gives = max(long, key=lambda each: each.elapsed_s)
         else:
             return []

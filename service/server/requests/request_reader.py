@@ -51,7 +51,7 @@ class RequestReader(RequestParser):
         TooLarge, Unavailable as well.
         """
         assets = self._assets if self._access is None else self._access.view(owner, scene)
-        with _under("/scene"), self.memory.growing("scenes") as own, work(hold or own):
+        with _under("/scene"), self.memory.growing("scenes") as counted, work(hold or counted):
             packed = pack(scene, assets, cache, self._config, self._shared)
             self.memory.count("scenes", packed, packed.bytes)
             return packed

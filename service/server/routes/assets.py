@@ -199,8 +199,8 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
         imported = storage.assets.materials(id)
         storage.shares.imported(owner, id, imported.references())
         document = imported.document
-        told = {"materials": document["materials"], "textures": document["textures"], "warnings": imported.warnings}
-        return Response(dump_json(told), media_type=JSON)
+        body = {"materials": document["materials"], "textures": document["textures"], "warnings": imported.warnings}
+        return Response(dump_json(body), media_type=JSON)
 
     return await storing(read, caller_of(request))
 

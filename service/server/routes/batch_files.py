@@ -136,7 +136,7 @@ async def sheet(
             drawn = layout.drawn(picture, batch.state_of)
             images.write(file, np.asarray(drawn), format)
 
-        with state.memory.held("pictures", SHEET_PIXEL_BYTES * pixels):
+        with state.memory.reserved("pictures", SHEET_PIXEL_BYTES * pixels):
             return await writing(partial(state.downloads.write, write, 3 * pixels))
 
     made = _Made(("sheet", format, width, view), steps, cell, images.FORMATS[format].mime, 3 * pixels)
@@ -171,7 +171,7 @@ async def animated(
         pictures = _Spooled(folder / "pictures", cell)
         await pictures.fill(request, batch, steps, view)
         animator = Animator(pictures.path, cell, len(steps), format, fps)
-        with state.memory.held("pictures", most_memory(cell, len(steps))):
+        with state.memory.reserved("pictures", most_memory(cell, len(steps))):
             try:
                 return await filming(partial(state.downloads.write, animator.write, most_bytes))
             finally:
@@ -207,7 +207,7 @@ async def _answered(
     if not await waiting.until(request, making):
         return Response(status_code=GONE)
     written = making.result()
-    return FileAnswer(written.file, made.mime, {"cache-control": "no-store"}, held=written)
+    return FileAnswer(written.file, made.mime, {"cache-control": "no-store"}, source=written)
 
 
 async def _written(

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.server.renders.status import iso
 from service.server.routes import answers, json_answers
 from service.server.state import app_state, owner_of
-from service.server.storage.callback_rows import KEPT, KEPT_S, Callback, Kind, State
+from service.server.storage.callback_rows import RETAINED, RETAINED_S, Callback, Kind, State
 from service.system.executors import recording
 
 router = APIRouter(prefix="/v1", tags=["callbacks"])
@@ -48,7 +48,7 @@ class CallbackAnswer(BaseModel):
     "/callbacks",
     summary="One's own callbacks, the newest first",
     description="A page of them; `Link` with `rel=next` leads to the next page while there is one. "
-    f"{KEPT} delivered and {KEPT} failed ones are kept, for {KEPT_S / 86_400:.0f} days.",
+    f"{RETAINED} delivered and {RETAINED} failed ones are kept, for {RETAINED_S / 86_400:.0f} days.",
     response_class=Response,
     responses=answers.shaped(list[CallbackAnswer]) | answers.problems(422, 503),
 )

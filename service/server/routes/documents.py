@@ -159,14 +159,14 @@ async def put(
     wanted = BY_LINK if by_link else shared
 
     def save(checked: CheckedDocument) -> tuple[str, bool, str]:
-        kept, new = state.storage.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
-        return kept, new, etag(checked.body.encode())
+        titled, new = state.storage.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
+        return titled, new, etag(checked.body.encode())
 
     async with state.bodies.read(request, check_kind(kind), caller_of(request)) as checked:
-        kept, new, response.headers["etag"] = await saving(partial(save, checked), caller_of(request))
+        titled, new, response.headers["etag"] = await saving(partial(save, checked), caller_of(request))
     if new:
         response.status_code = 201
-    return answers.Named(name=name, title=kept)
+    return answers.Named(name=name, title=titled)
 
 
 @router.delete(

@@ -34,9 +34,9 @@ class EditorFiles(Files):
         ending = Path(full_path).suffix
         if response.status_code != 200 or ending not in _COMMENTS or "range" in Headers(scope=scope):
             return response
-        kept = {name: response.headers[name] for name in ("etag", "last-modified")}
+        validators = {name: response.headers[name] for name in ("etag", "last-modified")}
         body = without_comments(str(full_path), stat_result.st_mtime_ns)
-        return Response(body, headers=kept, media_type=_COMMENTS[ending][1])
+        return Response(body, headers=validators, media_type=_COMMENTS[ending][1])
 
 
 @lru_cache(MOST)

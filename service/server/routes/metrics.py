@@ -105,7 +105,7 @@ def _kernels(members: Sequence[Member]) -> Iterator[Metric]:
     yield _histograms("compile_seconds", "Compiling kernels that were not in memory.", "renderer", compiled)
     found = _each(members, lambda seen: seen.kernels_found)
     yield _counters("kernel_cache_hits", "Loads whose kernel was in memory.", ("renderer",), found)
-    kernels = {id: float(count) for (id,), count in _each(members, lambda seen: seen.held.kernels).items()}
+    kernels = {id: float(count) for (id,), count in _each(members, lambda seen: seen.load.kernels).items()}
     yield _gauges("kernels", "Compiled kernels in a renderer's memory.", "renderer", kernels)
     evicted = _each(members, lambda seen: seen.kernels_evicted)
     yield _counters(
@@ -132,7 +132,7 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
 
 def _clients(state: AppState) -> Iterator[Metric]:
     renders = state.render_queue
-    states = {"queued": renders.queued, "running": renders.running, "kept": renders.kept}
+    states = {"queued": renders.queued, "running": renders.running, "kept": renders.retained}
     yield _gauges("renders", "Renders requested over REST.", "state", states)
     if renders.store is not None:
         pictures, failures = renders.store.pictures.bytes, renders.store.failures
@@ -147,9 +147,9 @@ def _clients(state: AppState) -> Iterator[Metric]:
 
 
 def _memory(state: AppState, members: Sequence[Member]) -> Iterator[Metric]:
-    tasks = {member.place.id: float(member.statistics.held.tasks) for member in members}
+    tasks = {member.place.id: float(member.statistics.load.tasks) for member in members}
     yield _gauges("renderer_tasks", "Pictures that a renderer stores.", "renderer", tasks)
-    stored = {member.place.id: float(member.statistics.held.bytes) for member in members}
+    stored = {member.place.id: float(member.statistics.load.bytes) for member in members}
     yield _gauges("gpu_bytes", "GPU memory that they take.", "renderer", stored)
     yield _gauges("memory_bytes", "Memory of SUNBOX_MEMORY, by what is in it.", "owner", state.memory.used())
     resting = state.render_queue.resting.bytes

@@ -274,7 +274,7 @@ async def _image(request: Request, job: Render, query: ImageQuery) -> Response:
         written = await picture_file(request, job, query, gone)
     if written is None:
         return Response(status_code=GONE)
-    return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
+    return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, source=written)
 
 
 async def picture_file(
@@ -291,7 +291,7 @@ async def picture_file(
         written = downloads.find(key)
         if written is None:
             downloads.admit(caller, _most_bytes(job, query))
-            with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
+            with state.memory.reserved("pictures", _texels(job, query) * FLOAT_BYTES):
                 written = await _written(downloads, job, query, await lut_of(request, query.lut))
             downloads.keep(caller, key, written, lasting=key is not None and query.aov == "all")
     return written

@@ -93,8 +93,8 @@ class AssetAccess:
 
         missing = ((ref, why) for ref in assets if (why := why_not(ref)) is not None)
         if first := dict(islice(missing, MOST_MISTAKES)):
-            told = (FieldError(pointer, first[ref]) for pointer, ref in uses if ref in first)
-            raise InvalidDocument(islice(told, MOST_MISTAKES))
+            mistakes = (FieldError(pointer, first[ref]) for pointer, ref in uses if ref in first)
+            raise InvalidDocument(islice(mistakes, MOST_MISTAKES))
         return AllowedUses(owner, assets)
 
     def view(self, owner: str, scene: Scene) -> Assets:

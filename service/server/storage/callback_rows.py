@@ -12,8 +12,8 @@ from typing import Literal
 from service.callback_hosts import origin_of
 from service.server.storage.database import Database
 
-KEPT = 1000  # delivered ones of one owner, and as many failed ones
-KEPT_S = 30 * 86_400.0  # after their end
+RETAINED = 1000  # delivered ones of one owner, and as many failed ones
+RETAINED_S = 30 * 86_400.0  # after their end
 
 Kind = Literal["render", "batch"]
 State = Literal["waiting", "due", "delivered", "failed"]
@@ -120,11 +120,11 @@ class CallbackRows:
             )  # fmt: skip
             if callback.ended_at is None:
                 return
-            database.execute("DELETE FROM callbacks WHERE ended_at <= ?", (callback.ended_at - KEPT_S,))
+            database.execute("DELETE FROM callbacks WHERE ended_at <= ?", (callback.ended_at - RETAINED_S,))
             database.execute(
                 "DELETE FROM callbacks WHERE owner = ?1 AND state = ?2 AND number <= (SELECT number FROM callbacks "
                 "WHERE owner = ?1 AND state = ?2 ORDER BY number DESC LIMIT 1 OFFSET ?3)",
-                (callback.owner, callback.state, KEPT),
+                (callback.owner, callback.state, RETAINED),
             )
 
     def listed(self, owner: str, state: State | None, limit: int, after: str | None) -> list[Callback]:

@@ -78,7 +78,7 @@ class Condition:
 
 ALWAYS = Condition()
 TABLES = ("documents", "uses", "document_links", "document_readers")  # with rows of one document
-_OWN = "FROM documents WHERE kind = ? AND name = ? AND owner = ?"
+_OF_OWNER = "FROM documents WHERE kind = ? AND name = ? AND owner = ?"
 
 
 def _matches(tags: tuple[str, ...], body: bytes | None) -> bool:
@@ -175,13 +175,13 @@ class Documents:
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
                 allowed = self._access.allowed(owner, document.uses)  # again: one may be deleted by now
-                old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
+                old = database.execute(f"SELECT title, shared, bytes, body {_OF_OWNER}", key).fetchone()
                 condition.check(None if old is None else old[3].encode())
                 self._check_share(database, owner, size - (old[2] if old else 0))
-                kept = title or (old[0] if old else name)
+                titled = title or (old[0] if old else name)
                 if shared is None:
                     shared = old[1] if old else (PRIVATE if owner else SHARED)
-                row = (*key, int(shared), kept, size, body)
+                row = (*key, int(shared), titled, size, body)
                 database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
                 database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
                 rows = [(asset, *key) for asset in allowed.assets]
@@ -193,7 +193,7 @@ class Documents:
                     database.execute("DELETE FROM document_readers WHERE kind = ? AND name = ? AND owner = ?", key)
                 _expire(database)
         log.info("document saved", {"kind": kind, "name": name, "bytes": size})
-        return kept, old is None
+        return titled, old is None
 
     def delete(self, kind: str, name: str, owner: str = "", condition: Condition = ALWAYS) -> None:
         """Delete an owner's document, or else one of a version without owners.
@@ -204,7 +204,7 @@ class Documents:
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             for key in dict.fromkeys(((kind, name, owner), (kind, name, ""))):
-                found = database.execute(f"SELECT body {_OWN}", key).fetchone()
+                found = database.execute(f"SELECT body {_OF_OWNER}", key).fetchone()
                 if found is not None:
                     break
             else:
@@ -240,13 +240,13 @@ class Documents:
         sizes = (
             "SELECT total(bytes) FILTER (WHERE owner = ?1), total(bytes) FILTER (WHERE owner <> ?1) FROM documents"
         )
-        own, others = map(int, database.execute(sizes, (owner,)).fetchone())
+        stored, others = map(int, database.execute(sizes, (owner,)).fetchone())
         most = self._each
         if most is None and self._most is not None:
             most = max(0, self._most - others) // 2
-        if most is not None and own + more > most:
+        if most is not None and stored + more > most:
             raise TooLarge(
-                f"With it your saved documents would take {own + more} bytes; {most} are allowed "
+                f"With it your saved documents would take {stored + more} bytes; {most} are allowed "
                 "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
             )
 

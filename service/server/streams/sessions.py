@@ -15,7 +15,7 @@ from service.system.background import Background
 from service.system.shares import Shares
 
 ID_BYTES = 32  # 256 bits: an id cannot be guessed
-KEPT_S = 60.0  # of the contract: how long a session waits for its client to come back
+RETURN_S = 60.0  # of the contract: how long a session waits for its client to come back
 GOING_AWAY = 1001  # close code
 
 log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ class Sessions:
         self._reader = reader
         self._most = most
         self._running = Background()
-        self._kept: dict[str, Session] = {}  # the longest left first, among those that are left
+        self._sessions: dict[str, Session] = {}  # the longest left first, among those that are left
 
     @property
     def attended(self) -> int:
@@ -51,7 +51,7 @@ class Sessions:
     @property
     def waiting(self) -> int:
         """How many sessions wait for their clients to come back."""
-        return len(self._kept) - self.attended
+        return len(self._sessions) - self.attended
 
     def enter(self, id: str | None, owner: str = "") -> Session:
         """A new session, or the one of that id; `leave` ends what this begins.
@@ -82,7 +82,7 @@ class Sessions:
             self._shares.release(owner or id)
             raise
         running = self._running.start("stream", stream.run(), stream.died)
-        self._kept[id] = session = Session(id, stream, owner, running)
+        self._sessions[id] = session = Session(id, stream, owner, running)
         return session
 
     def _admit(self, id: str, owner: str) -> None:
@@ -92,7 +92,7 @@ class Sessions:
 
     def _of(self, id: str | None, owner: str) -> Session | None:
         """The session of that id, if that key opened it."""
-        session = self._kept.get(id) if id is not None else None
+        session = self._sessions.get(id) if id is not None else None
         return session if session is not None and session.owner == owner else None
 
     def leave(self, session: Session) -> None:
@@ -101,29 +101,29 @@ class Sessions:
         if session.connections:
             return
         self._shares.release(session.owner or session.id)
-        if session.id not in self._kept:
+        if session.id not in self._sessions:
             return
         if session.stream.ended is not None:
             self._end(session)
             return
-        session.timer = asyncio.get_running_loop().call_later(KEPT_S, self._end, session)
-        self._kept[session.id] = self._kept.pop(session.id)
+        session.timer = asyncio.get_running_loop().call_later(RETURN_S, self._end, session)
+        self._sessions[session.id] = self._sessions.pop(session.id)
         if self.waiting > self._most:  # clients that come and go all the time must not fill the renderer's memory
-            waiting = [kept for kept in self._kept.values() if not kept.connections]
-            ((owner, _),) = Counter(kept.owner for kept in waiting).most_common(1)  # it costs their own key a session
-            self._end(next(kept for kept in waiting if kept.owner == owner))
+            waiting = [each for each in self._sessions.values() if not each.connections]
+            ((owner, _),) = Counter(each.owner for each in waiting).most_common(1)  # it costs their own key a session
+            self._end(next(each for each in waiting if each.owner == owner))
 
     def close(self, reason: str) -> None:
         """End all streams; their clients are told that the server goes away."""
-        for session in list(self._kept.values()):
+        for session in list(self._sessions.values()):
             session.stream.end(GOING_AWAY, reason)
             if not session.connections:
                 self._end(session)
 
     def _end(self, session: Session) -> None:
-        if self._kept.pop(session.id, None) is None:
+        if self._sessions.pop(session.id, None) is None:
             return
         if session.timer is not None:
             session.timer.cancel()
         session.running.cancel()
-        log.info("session ended", {"sessions": len(self._kept)})
+        log.info("session ended", {"sessions": len(self._sessions)})

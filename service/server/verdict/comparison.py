@@ -178,7 +178,7 @@ async def _of_two_documents(a: Source, b: Source, alpha: float, on_progress: OnP
     for done, group in enumerate(schedule.groups):
         on_progress(*schedule.share(done))
         settings = (limits.settings(each.settings, group.seed, group.samples) for each in (a, b))
-        first, second = await _together(*(each.render(own) for each, own in zip((a, b), settings, strict=True)))
+        first, second = await _together(*(each.render(given) for each, given in zip((a, b), settings, strict=True)))
         limits.spend(max(first.elapsed_s, second.elapsed_s))
         if evidence is None:
             evidence = await comparing(partial(Evidence, first.estimate, second.estimate, a.ways == b.ways))

@@ -123,8 +123,8 @@ def _tested(regions: list[_Regions]) -> Iterator[Found]:
     tell that some is missing. The variance of light that is seldom found goes with its mean, by Poisson's law."""
     least, above = np.zeros((1, 1, 1)), regions[-1].side if regions else 1  # squares by brightness, of larger regions
     for each in reversed(regions):
-        own = _ratio(each.squares, each.brightness)
-        least, above = np.maximum(own, _spread(least, above // each.side, own.shape)), each.side
+        ratio = _ratio(each.squares, each.brightness)
+        least, above = np.maximum(ratio, _spread(least, above // each.side, ratio.shape)), each.side
         yield each.side, _two_sided(each.sums, each.rounding, np.maximum(each.squares, least * each.brightness))
 
 

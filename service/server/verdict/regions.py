@@ -40,8 +40,8 @@ def p_map(levels: list[Level], shape: tuple[int, int], alpha: float) -> Array:
     out = np.ones(shape)
     for level in sorted(levels, key=lambda level: level.side):
         known = blocks((out < alpha).astype(np.float64), level.side)
-        told = np.where((level.p < alpha) & (known == 0), level.p, 1.0)
-        out = np.minimum(out, spread(told, level.side, shape))
+        new = np.where((level.p < alpha) & (known == 0), level.p, 1.0)
+        out = np.minimum(out, spread(new, level.side, shape))
     return out
 
 

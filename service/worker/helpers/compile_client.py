@@ -213,7 +213,7 @@ class CompileClient:
 
     def _is_recorded(self, key: KernelKey) -> bool:
         if self._keeps is not None and key.is_ours:
-            return key.is_kept(self._keeps)
+            return key.is_cached(self._keeps)
         return self._able and os.path.exists(self._records / key.digest(self._driver))
 
     def _refusal(self, key: KernelKey) -> str | None:
@@ -329,11 +329,11 @@ class UsedKernels:
         if key in self._noted:
             return
         self._noted.add(key)
-        kept = [each for each in self._read() if each != key][1 - MOST :]
+        recent = [each for each in self._read() if each != key][1 - MOST :]
         temporary = self._path.with_name(f"{self._path.name}.{os.getpid()}")
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(json.dumps([_plain(each) for each in [*kept, key]]))
+            temporary.write_text(json.dumps([_plain(each) for each in [*recent, key]]))
             temporary.replace(self._path)
         except OSError as error:
             log.info("could not record a kernel that is used", {"error": error})

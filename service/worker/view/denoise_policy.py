@@ -102,10 +102,10 @@ class DenoisePolicy:
         """True if it takes so little that even a first look may wait for it: the denoiser has started."""
         return self._denoiser.has_answered
 
-    def covers(self, aov: str, noise: float | None, kept: bool = False) -> bool:
-        """True if such a picture is shown denoised, or is where it is `kept`: not when it is clean, nor when nothing
+    def covers(self, aov: str, noise: float | None, final: bool = False) -> bool:
+        """True if such a picture is shown denoised, or is where it is `final`: not when it is clean, nor when nothing
         can denoise it."""
-        if aov != "color" or not self.able or (kept and not self.wanted):
+        if aov != "color" or not self.able or (final and not self.wanted):
             return False
         return noise is None or noise >= (CLEAN if self.wanted else FADED)
 

@@ -189,7 +189,7 @@ class FrameSource:
             return
         clean = None
         noise = None if full is None else self._tracker.meter.read(full, fresh=True)
-        if full is not None and self.denoising.covers(read.view.aov, noise, kept=True):
+        if full is not None and self.denoising.covers(read.view.aov, noise, final=True):
             clean = self.denoising.has(full.samples)
             if clean is None:
                 self._denoised_reads.append(read)

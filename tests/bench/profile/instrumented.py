@@ -63,7 +63,7 @@ class InstrumentedRenderer(Renderer):
     def count(self, picture: Picture, samples: int) -> np.ndarray:
         """The counters, (counters,) int64, after that many further samples of every pixel. The noise meter, which
         traces with the same kernel, must be off."""
-        self._own()
+        self._use_context()
         self._counts.write(bytes(self._counts.size))
         wanted = picture.samples + samples
         while picture.samples < wanted:

@@ -165,7 +165,7 @@ def test_batches_under_way_have_no_more_renders_than_are_kept(tmp_path: Path) ->
     renderers = Renderers()
 
     async def scenario() -> None:
-        limits = replace(LIMITS, retention=replace(LIMITS.retention, kept=3))
+        limits = replace(LIMITS, retention=replace(LIMITS.retention, most_renders=3))
         renders = RenderQueue(limits, RenderStore(tmp_path))
         members: Any = lambda batch, body: Members(batch, renderers)  # noqa: E731
         batches = BatchQueue(renders, members, lambda order, outcome: Render(renderers, order, load), 2)  # type: ignore[arg-type]
@@ -237,7 +237,7 @@ def test_an_ended_render_is_a_row_until_somebody_looks_at_it(tmp_path: Path) -> 
         batch = batches.get(order.id, "anna")
         await looked_at(renders, batches, batch)
         told.append(batch.status())
-        assert renders.kept == 1 and batch.size > 0
+        assert renders.retained == 1 and batch.size > 0
         await batches.delete(batch)
         with pytest.raises(NotFound):
             await batches.render(member_id(batch.id, 2), "anna")

@@ -107,20 +107,20 @@ def test_leases_and_results_find_their_way() -> None:
     division, peers = _pool("a", "a", "a")
     _begin(division, 1, 0, most=2)
     lease, done = Lease(1, 1, 77, 1, 8, 56, 0, 8), LeaseDone(1, 1, 77, np.zeros(0))
-    division.handed(lease, 0)
+    division.forward(lease, 0)
     assert peers[1].told[-1] == lease
-    division.handed(done, 1)
+    division.forward(done, 1)
     assert peers[0].told[-1] is done and peers[1].leases == {"given": 1, "done": 1}
     peers[0].take()
-    division.handed(done, 2)  # nobody asked it
-    division.handed(Lease(1, 1, 78, 2, 8, 56, 0, 8), 0)  # which does not assist any more
+    division.forward(done, 2)  # nobody asked it
+    division.forward(Lease(1, 1, 78, 2, 8, 56, 0, 8), 0)  # which does not assist any more
     assert not peers[0].told and not peers[2].told
 
 
 def test_who_cannot_load_the_scene_is_not_asked_again_before_there_is_another() -> None:
     division, peers = _pool("a", "a")
     _begin(division, 1, 0)
-    division.handed(LeaseFailed(1, 1, "out of memory"), 1)
+    division.forward(LeaseFailed(1, 1, "out of memory"), 1)
     assert division.renderers(1) == 1 and peers[0].told[-1] == Assistants(1, ())
     division.assign()
     assert division.renderers(1) == 1
@@ -131,9 +131,9 @@ def test_who_cannot_load_the_scene_is_not_asked_again_before_there_is_another() 
 def test_whose_results_are_wrong_assists_in_no_picture(caplog: pytest.LogCaptureFixture) -> None:
     division, peers = _pool("a", "a", "a")
     _begin(division, 1, 0)
-    division.handed(LeaseRefuted(1, 1, 2), 1)  # only a home can say so
+    division.forward(LeaseRefuted(1, 1, 2), 1)  # only a home can say so
     assert division.renderers(1) == 3 and not peers[2].leases
-    division.handed(LeaseRefuted(1, 1, 1), 0)
+    division.forward(LeaseRefuted(1, 1, 1), 0)
     assert division.renderers(1) == 2 and peers[0].told[-1] == Assistants(1, (2,)) and peers[1].told[-1] == Drop(1)
     assert peers[1].leases["wrong"] == 1 and "task=1 home=0 renderer=1" in caplog.text
     division.dropped(1)
@@ -158,7 +158,7 @@ def test_a_lost_assistant_is_taken_off_the_list_and_a_lost_home_is_told_again() 
     peers[1].driver = "a"
     division.assign()
     peers[0].take()
-    division.told(1)
+    division.replayed(1)
     assert peers[0].take() == [Assistants(1, (1,))]
 
 

@@ -16,7 +16,7 @@ from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopR
 from service.problems import Unavailable
 from service.renderers.local import restarts
 from service.renderers.local.supervisor import Supervisor
-from service.renderers.statistics import Held
+from service.renderers.statistics import RendererLoad
 from tests.service.rendering.fakes import FakeProcesses, until, with_fake_processes
 from tests.serving import PATIENCE_S
 from tests.supervisors import LINEAR, Ears, Rendering, arrays_of, settings
@@ -155,12 +155,12 @@ def test_a_renderer_that_makes_a_mistake_is_not_one_that_was_killed(rendering: R
     async def test(supervisor: Supervisor) -> None:
         pid, before = supervisor.process_id, Counter(supervisor.statistics.restarts)
         assert supervisor._keeper.process is not None
-        supervisor.statistics.held = Held(resting_bytes=1 << 40)
+        supervisor.statistics.load = RendererLoad(resting_bytes=1 << 40)
         supervisor._keeper.process.link.send("no message")
         while supervisor.process_id in (pid, None):
             await asyncio.sleep(0.001)
         assert supervisor.statistics.restarts - before == {"crashed": 1}
-        assert not supervisor.statistics.held.resting_bytes
+        assert not supervisor.statistics.load.resting_bytes
 
     rendering(test)
 

@@ -117,7 +117,7 @@ def test_it_fades_as_the_noise_falls() -> None:
     assert not policy.covers("color", None)
     policy.set_view(View(denoise=True))
     assert denoiser.started and policy.covers("color", None) and policy.covers("color", 0.016)
-    assert not policy.covers("color", 0.014) and not policy.covers("color", None, kept=True)
+    assert not policy.covers("color", 0.014) and not policy.covers("color", None, final=True)
     assert [shown(policy, noise) for noise in (None, 0.5, 0.03)] == [1.0, 1.0, 1.0]
     assert shown(policy, 0.0225) == pytest.approx(0.5) and shown(policy, 0.015) == 0.0
 
@@ -127,7 +127,7 @@ def test_the_setting_has_it_whole_and_begins_anew() -> None:
     policy.set_view(View(denoise=True))
     assert shown(policy, 0.0225) == pytest.approx(0.5)
     policy.want(True)
-    assert policy.latest is None and policy.covers("color", 0.006, kept=True)
+    assert policy.latest is None and policy.covers("color", 0.006, final=True)
     assert shown(policy, 0.0225) == 1.0
 
 

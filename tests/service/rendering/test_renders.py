@@ -75,7 +75,7 @@ def test_the_oldest_of_an_owner_make_room() -> None:
         with pytest.raises(NotFound):
             renders.get("a0", "b")
 
-    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept=2)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, most_renders=2)), scenario)
 
 
 def test_who_holds_most_makes_room() -> None:
@@ -86,7 +86,7 @@ def test_who_holds_most_makes_room() -> None:
         assert renders.get("small", "b") is small and renders.get("a1", "a") is big[1]
         assert big[0].released and not small.released
 
-    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_bytes=100)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, most_bytes=100)), scenario)
 
 
 def test_the_newest_stays_however_large() -> None:
@@ -94,7 +94,7 @@ def test_the_newest_stays_however_large() -> None:
         await ended(renders, Job("a", size=1000))
         assert renders.get("a").id == "a"
 
-    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_bytes=10)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, most_bytes=10)), scenario)
 
 
 def test_time_makes_an_end() -> None:
@@ -105,9 +105,9 @@ def test_time_makes_an_end() -> None:
         await asyncio.sleep(1.2)
         with pytest.raises(Gone):
             renders.get("first")
-        assert first.released and renders.kept == 0
+        assert first.released and renders.retained == 0
 
-    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_s=0.05)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, longest_s=0.05)), scenario)
 
 
 def test_others_do_not_hear_of_it() -> None:

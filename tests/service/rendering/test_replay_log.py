@@ -25,7 +25,7 @@ def send_scene(log: ReplayLog, generation: int) -> None:
     """A whole scene, which may turn out to be too much for the renderer."""
     update = Update(1, generation, settings={"width": generation}, stop=StopRule())
     encoded = channel.encode(update)
-    log.scene_told(update, encoded)
+    log.note_scene(update, encoded)
     channel.discard(encoded)
 
 

@@ -17,7 +17,7 @@ from service.problems import Gone, TooManyRequests, Unavailable
 from service.server.renders.documents import WaitingDocuments
 from service.server.renders.queue import RenderQueue
 from service.server.renders.render import Render
-from service.server.renders.retention import KeptRenders, Retention
+from service.server.renders.retention import RetainedRenders, Retention
 from service.server.renders.status import status
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore
@@ -49,7 +49,7 @@ class Ended:
 
 
 def test_an_end_costs_as_much_among_many_as_among_few() -> None:
-    kept: KeptRenders[Ended] = KeptRenders(Retention(kept=10_000, kept_bytes=1 << 40, kept_s=1e6))
+    kept: RetainedRenders[Ended] = RetainedRenders(Retention(most_renders=10_000, most_bytes=1 << 40, longest_s=1e6))
     looks = []
     for number in range(5000):
         Ended.looks = 0
@@ -61,7 +61,7 @@ def test_an_end_costs_as_much_among_many_as_among_few() -> None:
 
 
 def test_old_ones_and_those_of_the_owner_of_most_bytes_go() -> None:
-    kept: KeptRenders[Ended] = KeptRenders(Retention(kept=3, kept_bytes=100, kept_s=10.0))
+    kept: RetainedRenders[Ended] = RetainedRenders(Retention(most_renders=3, most_bytes=100, longest_s=10.0))
     small, *large = Ended("b", 1.0, 10), *(Ended("a", 2.0 + i, 40) for i in range(3))
     for each in (small, *large):
         kept.add(each)
@@ -74,7 +74,7 @@ def test_old_ones_and_those_of_the_owner_of_most_bytes_go() -> None:
 
 
 def test_renders_of_batches_count_too() -> None:
-    kept: KeptRenders[Ended] = KeptRenders(Retention(kept=10, kept_bytes=100, kept_s=100.0))
+    kept: RetainedRenders[Ended] = RetainedRenders(Retention(most_renders=10, most_bytes=100, longest_s=100.0))
     single, *batches = Ended("a", 1.0), *(Ended("a", 2.0 + i) for i in range(3)), Ended("b", 9.0)
     for each, count in zip(batches, (4, 6, 12, 1000), strict=True):
         each.counts_as = count
@@ -205,7 +205,7 @@ def test_what_is_deleted_is_gone_from_everywhere(tmp_path: Path) -> None:
         await disk.queue.delete(job)
         with disk.kept.documents.assets_in_use() as in_use:
             assert asset not in in_use
-        assert (await disk.queue.page("a")).renders == [] and disk.queue.kept == 0
+        assert (await disk.queue.page("a")).renders == [] and disk.queue.retained == 0
         assert disk.store.latest("id") is None and not list((tmp_path / "renders").iterdir())
         with pytest.raises(Gone, match="deleted"):
             disk.queue.get("id", "a")

@@ -108,7 +108,7 @@ def test_a_session_that_is_gone(server: Server, session: str) -> None:
 
 def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a renderer: who is let in, and what is forgotten when."""
-    monkeypatch.setattr(sessions, "KEPT_S", 0.05)
+    monkeypatch.setattr(sessions, "RETURN_S", 0.05)
 
     async def test() -> None:
         supervisor: Any = Supervisor()

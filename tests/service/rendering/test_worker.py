@@ -334,7 +334,7 @@ def test_what_was_used_is_told(rendering: Any, arrays: Any) -> None:
         used_s = supervisor.statistics.gpu_s["render"] - before.get("render", 0.0)
         assert 0 < used_s < 20 and supervisor.statistics.gpu_s_of[task] == pytest.approx(used_s)
         assert supervisor.statistics.samples - samples == 20 * 32 * 32
-        assert supervisor.statistics.setup_s.count == loads + 1 and supervisor.statistics.held.tasks >= 1
+        assert supervisor.statistics.setup_s.count == loads + 1 and supervisor.statistics.load.tasks >= 1
         supervisor.drop(task)
         assert task not in supervisor.statistics.gpu_s_of
 

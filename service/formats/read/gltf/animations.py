@@ -40,7 +40,7 @@ def pose(file: GltfDocument, name: str, time: float, notes: Warnings) -> None:
 
     Raises ParseError.
     """
-    place = next((place for place, own in _named(file) if own == name), None)
+    place = next((place for place, each in _named(file) if each == name), None)
     if place is None:
         raise ParseError(f"there is no animation {shown(name)}", "/animations")
     samplers = list(place.objects("samplers"))

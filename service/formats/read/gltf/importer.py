@@ -15,7 +15,7 @@ from service.formats.read.gltf.extensions import note_unsupported
 from service.formats.read.gltf.json_view import JsonView, whole
 from service.formats.read.gltf.materials import Materials
 from service.formats.read.gltf.nodes import Node, Nodes, instances
-from service.formats.read.gltf.primitives import Primitive, own_notes, read_primitive
+from service.formats.read.gltf.primitives import Primitive, exporter_notes, read_primitive
 from service.formats.read.gltf.textures import Textures
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes import metering
@@ -46,7 +46,7 @@ class _Importer:
         self.textures = Textures(file, self.notes, self.files.add)
         self.materials = Materials(file, self.textures, self.notes)
         self.placements = Placements()
-        self._held: set[str] = set()  # references of parts
+        self._counted: set[str] = set()  # references of parts
         self._triangles = 0  # of these
         self._read: dict[str, Primitive | None] = {}
         self._parts: dict[tuple[Any, ...], Part | None] = {}
@@ -62,8 +62,8 @@ class _Importer:
         if not shapes:
             raise self.notes.nothing_left()
         around = self.placements.bounds
-        own, aspect = lights_and_camera.camera(file, shown, around, self.notes)
-        camera = own or framed(around)
+        found, aspect = lights_and_camera.camera(file, shown, around, self.notes)
+        camera = found or framed(around)
         document = {
             "version": 1,
             "camera": camera,
@@ -75,7 +75,9 @@ class _Importer:
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
         lighting = Warnings()
         is_dark = _is_dark(file)
-        remark = None if is_dark else stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
+        remark = (
+            None if is_dark else stand_inside(used, self.placements.placed(), around, has_camera=found is not None)
+        )
         if remark is not None:
             lighting.add("", remark)
         exposure = self._metered(used, aspect, lighting) if lights else None
@@ -152,8 +154,8 @@ class _Importer:
         charts = [None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]]) for uv in primitive.uvs]
         data = ply(vertices, primitive.faces, primitive.normals, charts, primitive.colors, primitive.tangents)
         reference = self.files.add_mesh(data, place.pointer, vertices, len(primitive.faces))
-        self._triangles += 0 if reference in self._held else len(primitive.faces)
-        self._held.add(reference)
+        self._triangles += 0 if reference in self._counted else len(primitive.faces)
+        self._counted.add(reference)
         limit = self.file.limits.max_triangles
         if self._triangles > limit:
             raise ParseError(f"the scene has more than the {limit} triangles allowed")
@@ -184,15 +186,15 @@ def _is_dark(file: GltfDocument) -> bool:
     if not file.count("scenes"):
         return False
     scene = file.item("scenes", file.root.value.get("scene", 0), "/scene")
-    return own_notes(scene).get("environment") == "none"
+    return exporter_notes(scene).get("environment") == "none"
 
 
 def _named(node: Node, mesh: JsonView) -> str:
     """The name of a node's mesh: the node's path; below that, by its own name, where the node has children, too."""
-    own = "-".join(mesh.text("name", "").split("/"))[:LONGEST]
+    mesh_name = "-".join(mesh.text("name", "").split("/"))[:LONGEST]
     if not node.path:
-        return own
-    return f"{node.path}/{own or 'Mesh'}" if node.place.array("children") else node.path
+        return mesh_name
+    return f"{node.path}/{mesh_name or 'Mesh'}" if node.place.array("children") else node.path
 
 
 def _wrong(primitive: Primitive, place: JsonView, name: str, rows: Array, row: int, what: str) -> ParseError:

@@ -125,7 +125,7 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
     if not len(triangles):
         notes.leave_out(place.pointer, "the primitive has no triangles and is left out")
         return None
-    is_smooth = own_notes(place).get("normals") == "computed" and "TANGENT" not in rows and "NORMAL" in rows
+    is_smooth = exporter_notes(place).get("normals") == "computed" and "TANGENT" not in rows and "NORMAL" in rows
     if is_smooth:
         del rows["NORMAL"]
     sets = sum(f"JOINTS_{k}" in rows and f"WEIGHTS_{k}" in rows for k in range(len(rows)))
@@ -142,7 +142,7 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
     ).compact()
 
 
-def own_notes(place: JsonView) -> dict[str, Any]:
+def exporter_notes(place: JsonView) -> dict[str, Any]:
     """Our exporter's notes in an object's `extras`; empty where something else stands there."""
     extras = place.value.get("extras")
     noted = extras.get("sunbox") if isinstance(extras, dict) else None

@@ -161,11 +161,11 @@ def fixed(tree: Tree) -> Floats | None:
 def in_frame(tree: Tree) -> Floats | None:
     """(3,) the value of a tree that is made of the surface's own directions, in their frame; None for any other.
     Raises Unsupported."""
-    own = [one for one in walk(tree) if one.operation in FRAME]
+    directions = [one for one in walk(tree) if one.operation in FRAME]
     others = ("image", "texcoord", "heighttonormal", *(one for one in GEOMETRY if one not in FRAME))
-    if not own or any(one.operation in others for one in walk(tree)):
+    if not directions or any(one.operation in others for one in walk(tree)):
         return None
-    known = {id(one): np.array([FRAME[one.operation]], np.float32) for one in own}
+    known = {id(one): np.array([FRAME[one.operation]], np.float32) for one in directions}
     found: Floats = Places(np.zeros((1, 2), np.float32), _known=known).value(tree)[0]
     return found
 
@@ -190,10 +190,10 @@ def scaled(position: Tree) -> float | None:
         return 1.0
     if position.operation not in ("multiply", "divide"):
         return None
-    by, own = fixed(position.inputs["in2"]), scaled(position.inputs["in1"])
-    if by is None or own is None or np.ptp(by) or not by[0]:
+    by, scale = fixed(position.inputs["in2"]), scaled(position.inputs["in1"])
+    if by is None or scale is None or np.ptp(by) or not by[0]:
         return None
-    return own * float(by[0]) if position.operation == "multiply" else own / float(by[0])
+    return scale * float(by[0]) if position.operation == "multiply" else scale / float(by[0])
 
 
 def factors(tree: Tree, image: Tree) -> tuple[Doubles, list[int]] | None:

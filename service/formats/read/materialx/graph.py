@@ -111,8 +111,8 @@ class Graphs:
         if interface:
             if scope is not None and interface in scope.inputs:
                 return scope.inputs[interface]
-            own = parent.getInput(interface) if parent.getCategory() == "nodegraph" else None
-            return self._input(parent, None, interface, scope) if own is not None else None
+            declared = parent.getInput(interface) if parent.getCategory() == "nodegraph" else None
+            return self._input(parent, None, interface, scope) if declared is not None else None
         graph, node, output = given.getNodeGraphString(), given.getNodeName(), given.getOutputString()
         if graph:
             outer = parent.getParent() if parent.getCategory() == "nodegraph" else parent

@@ -142,8 +142,8 @@ def worley(p: Points, size: int, jitter: Points, is_cell: bool) -> Points:
     dimensions = p.shape[1]
     far, nearest = np.full((len(p), size), 1e6, np.float32), np.zeros_like(p)
     for around in product((-1, 0, 1), repeat=dimensions):
-        own = [cell[:, k] + around[k] for k in range(dimensions)]
-        off = np.stack([_unit(hashed(*own, np.full_like(own[0], k))) for k in range(dimensions)], axis=-1)
+        neighbour = [cell[:, k] + around[k] for k in range(dimensions)]
+        off = np.stack([_unit(hashed(*neighbour, np.full_like(neighbour[0], k))) for k in range(dimensions)], axis=-1)
         away = np.array(around, np.float32) + (off - 0.5) * jitter + 0.5 - f
         square = np.einsum("nk,nk->n", away, away)
         nearest = np.where((square < far[:, 0])[:, None], away, nearest)

@@ -15,7 +15,7 @@ from service.formats.types import Doubles, Floats
 
 ANGLES = 91  # from the normal, a degree apart
 EXACT = 1.001  # the albedo to which sums over directions are right
-TOLD = 1.01
+WARNED_ABOVE = 1.01
 
 
 def limits(theta: Doubles, albedo: Doubles) -> Floats:
@@ -31,9 +31,9 @@ def limits(theta: Doubles, albedo: Doubles) -> Floats:
 
 def warnings(theta: Doubles, albedo: Doubles) -> Iterator[str]:
     most = albedo.max(axis=1)
-    if (most > TOLD).any():
+    if (most > WARNED_ABOVE).any():
         at = int(most.argmax())
-        first = np.degrees(theta[most > TOLD].min())
+        first = np.degrees(theta[most > WARNED_ABOVE].min())
         yield (
             f"it reflects more light than arrives from {first:.0f} degrees on, up to {most[at]:.2f} times as much at "
             f"{np.degrees(theta[at]):.0f} degrees: there it is scaled down to all of it"

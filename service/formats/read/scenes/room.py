@@ -61,10 +61,10 @@ def _enclosed(placed: list[Placed], bounds: Bounds) -> float:
     if not volume > 0:
         return 0.0
     sums = {id(one.faces): one for one in placed}
-    own = {key: _sums(one) for key, one in sums.items()}
+    by_faces = {key: _sums(one) for key, one in sums.items()}
     worlds = np.array([one.world for one in placed], np.float64)
-    dots = np.array([own[id(one.faces)][0] for one in placed])
-    areas = np.array([own[id(one.faces)][1] for one in placed])
+    dots = np.array([by_faces[id(one.faces)][0] for one in placed])
+    areas = np.array([by_faces[id(one.faces)][1] for one in placed])
     linear, moved = worlds[:, :3, :3], worlds[:, :3, 3] - (low + high) / 2
     cofactors = np.stack([np.cross(linear[:, :, k - 2], linear[:, :, k - 1]) for k in range(3)], axis=-1)
     det = np.linalg.det(linear)

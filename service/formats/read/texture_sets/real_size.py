@@ -33,13 +33,13 @@ def by_note(archive: Archive) -> tuple[str, Size] | None:
     found = []
     for name in archive.names:
         if name.lower().endswith(".json") and archive.size(name) <= MOST_BYTES:
-            size = _told(archive.read(name))
+            size = _noted_size(archive.read(name))
             if size is not None:
                 found.append((name, size))
     return found[0] if len(found) == 1 else None
 
 
-def _told(data: bytes) -> Size | None:
+def _noted_size(data: bytes) -> Size | None:
     try:
         note = json.loads(data)
     except (ValueError, RecursionError):

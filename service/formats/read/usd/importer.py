@@ -72,10 +72,10 @@ class _Importer:
         shapes, placed = self.placements.shapes(self.notes), self.placements.placed()
         lamps, lights = self.lights.lamps, self.lights.lights
         seen = [item for item in self.items if item.prim.IsA(UsdGeom.Camera)]
-        own, aspect = cameras.camera(seen, self.time, self.unit, around, self.notes)
+        found, aspect = cameras.camera(seen, self.time, self.unit, around, self.notes)
         document: dict[str, Any] = {
             "version": 1,
-            "camera": own or framed(around),
+            "camera": found or framed(around),
             "environment": self.lights.environment,
             "lights": lights,
             "textures": self.textures.documents,
@@ -86,7 +86,7 @@ class _Importer:
         lighting = Warnings()
         is_lit = bool(lights or lamps or self.lights.environment)
         if not is_lit:
-            remark = stand_inside(used, placed, around, has_camera=own is not None)
+            remark = stand_inside(used, placed, around, has_camera=found is not None)
             if remark is not None:
                 lighting.add("", remark)
             is_lit = bool(used.get("lights"))
@@ -118,8 +118,8 @@ class _Importer:
                 chart = piece.uvs[0]
                 uvs.append(np.zeros((len(piece.vertices), 2)) if chart is None else chart)
                 at += len(piece.vertices)
-        told = [f"{note['pointer']}: {note['detail']}" for note in self.notes.document()]
-        return RawMesh(np.concatenate(vertices), np.concatenate(faces), None, np.concatenate(uvs), warnings=told)
+        warnings = [f"{note['pointer']}: {note['detail']}" for note in self.notes.document()]
+        return RawMesh(np.concatenate(vertices), np.concatenate(faces), None, np.concatenate(uvs), warnings=warnings)
 
     def _add(self, item: Item) -> None:
         prim = item.prim

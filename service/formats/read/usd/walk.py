@@ -93,11 +93,11 @@ class Walk:
         if len(matrices) != len(numbers):
             self._notes.leave_out(pointer, "its positions and protoIndices differ in number; it is left out")
             return
-        kept = np.array(instancer.ComputeMaskAtTime(self._time) or np.ones(len(numbers)), bool)
+        visible = np.array(instancer.ComputeMaskAtTime(self._time) or np.ones(len(numbers)), bool)
         placed = np.array([np.array(one) for one in matrices]).transpose(0, 2, 1)
         for k, target in enumerate(targets):
             prim = self._stage.GetPrimAtPath(target)
-            rows = placed[kept & (numbers == k)]
+            rows = placed[visible & (numbers == k)]
             if not prim or not len(rows):
                 continue
             every = (worlds[:, None] @ rows[None]).reshape(-1, 4, 4)
@@ -108,9 +108,9 @@ class Walk:
 
     def _purpose(self, seen: UsdGeom.Imageable, above: str) -> str:
         """A prim's own purpose, where it or its schema says one; else that of what is above it."""
-        own = seen.GetPurposeAttr()
-        if own.HasAuthoredValue():
-            return str(own.Get())
+        purpose = seen.GetPurposeAttr()
+        if purpose.HasAuthoredValue():
+            return str(purpose.Get())
         return above
 
     def _children(self, prim: Usd.Prim) -> list[Usd.Prim]:

@@ -37,7 +37,7 @@ def check_renders(folder: Path, report: Report) -> int:
                 count += 1
                 known |= names
                 for fault in _faults(folder, database, files, render):
-                    if _is_kept(folder, render):  # it may have made room meanwhile
+                    if _is_stored(folder, render):  # it may have made room meanwhile
                         report.faults.append(f"renders/{render.order.id}: {fault}")
     except sqlite3.Error as error:
         report.faults.append(f"{FILE}: the renders cannot be read: {error}")
@@ -115,7 +115,7 @@ def _of_batch(database: sqlite3.Connection, number: int) -> tuple[bytes] | None:
     return found
 
 
-def _is_kept(folder: Path, render: StoredRender) -> bool:
+def _is_stored(folder: Path, render: StoredRender) -> bool:
     with closing(reading(folder / FILE)) as database:
         row = database.execute("SELECT gone FROM renders WHERE number = ?", (render.number,)).fetchone()
     return bool(row == (0,))

@@ -53,7 +53,7 @@ class RenderRows:
 
     def __init__(self, database: Database) -> None:
         self._database = database
-        self._held = ExitStack()
+        self._open = ExitStack()
 
     def hold(self) -> None:
         """Keep a connection open, which `close` closes in the same thread.
@@ -61,11 +61,11 @@ class RenderRows:
         Closing the last one writes the log into the file and deletes it, and syncs both: three times what a commit
         takes.
         """
-        connection = self._held.enter_context(self._database.open())
+        connection = self._open.enter_context(self._database.open())
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
 
     def close(self) -> None:
-        self._held.close()
+        self._open.close()
 
     def insert(
         self,

@@ -90,9 +90,9 @@ class RenderStore:
                 )
         if left_out := set[str]().union(*(each.unknown for each in stored)):
             log.warning("left out what this version does not know of renders", {"fields": ",".join(sorted(left_out))})
-        kept, gone = ([each.order.id for each in stored if each.gone is is_gone] for is_gone in (False, True))
+        present, gone = ([each.order.id for each in stored if each.gone is is_gone] for is_gone in (False, True))
         ended = [each.id for each in self._rows.ended_members()]
-        self._files.prepare({*kept, *ended}, gone)
+        self._files.prepare({*present, *ended}, gone)
         for id in ended:
             self._tidy(id)
         return [each if each.gone else self._reached(each) for each in stored]
