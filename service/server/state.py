@@ -80,7 +80,7 @@ class AppState:
         self.memory.cache("assets", lambda: loader.bytes, loader.shrink)
         self.memory.cache("scenes", self._resting_bytes, lambda size: None)
         self.memory.cache("assets", loader.sandbox.children.working_bytes, lambda size: None)
-        self.memory.cache("pictures", lambda: 0, self.render_queue.resting.shrink)  # renders count themselves
+        self.memory.cache("pictures", lambda: 0, self.render_queue.loaded_pictures.shrink)  # renders count themselves
         self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)
         self.bodies = Bodies(self.config, self.memory)
         most = max(self.config.max_bodies, 4 * self.config.max_body)

@@ -21,7 +21,8 @@ NO_SERVER = ("bench", "cli")
 OF_FILES = ("formats", "document", "server/assets", "server/verdict")
 BOUNDING = {
     "BoundedSemaphore", "Children", "ClientExecutor", "Limit", "Pool", "ProcessPoolExecutor", "Queue", "Room",
-    "Semaphore", "Shares", "ThreadPoolExecutor", "FairSemaphore", "Turns", "_Room", "run_in_executor", "to_thread",
+    "Semaphore", "Shares", "ThreadPoolExecutor", "FairQueue", "FairSemaphore", "_Room", "run_in_executor",
+    "to_thread",
 }  # fmt: skip
 BOUNDS = re.compile(
     r"AT_ONCE|(^|_)EACH$|^MOST$|OF_ONE|OPEN_OF|WAITS$|WAITING$|TOGETHER$|QUEUED$|REFUSALS|^ROOM$|LASTING$|FEW"
@@ -84,7 +85,7 @@ CODE = {
     "server/renders/documents.py self._reserve = Shares": SHARES,
     "server/renders/slots.py AT_ONCE": "renders that are looked at in one go, of all owners in turns",
     "server/renders/slots.py FEW": "of one owner",
-    "server/renders/slots.py self.waiting = Turns": "turns go round owners; the last slot is for one who has none",
+    "server/renders/slots.py self.waiting = FairQueue": "turns go round owners; one who has none gets the last slot",
     "server/requests/bodies.py AT_ONCE": LIMIT,
     "server/requests/bodies.py self._limit = Limit": LIMIT,
     "server/requests/parser_pool.py self._children = Children": "one for each thread of `waiting_for_parsers`",

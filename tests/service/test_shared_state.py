@@ -283,7 +283,7 @@ def _budget(folder: Path) -> Hammer:
     budget.cache("assets", lambda: 10, lambda size: None)
 
     def turn(i: int) -> None:
-        with budget.held("scenes", i % 100):
+        with budget.reserved("scenes", i % 100):
             assert budget.used()["scenes"] >= i % 100
         budget.hold("bodies", type("Holder", (), {})(), 1)  # garbage from the next moment on
         budget.lacks(i)

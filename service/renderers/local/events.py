@@ -34,7 +34,7 @@ class Events(Protocol):
         """The kind of another renderer's task, which this one assists."""
 
 
-class Alone:
+class NoEvents:
     """Where a renderer is the only one, nobody needs its events."""
 
     def changed(self) -> None: ...

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from service.ipc import channel
 from service.ipc.messages import FromRenderer, Heard, Ready, ToRenderer, Unable
 from service.problems import Unavailable
-from service.renderers.local.process import Cause, RendererProcess, Start, Waiting
+from service.renderers.local.process import Cause, NoPlace, RendererProcess, Start
 from service.renderers.local.restarts import Restarts
 from service.renderers.protocol import State
 from service.renderers.statistics import RendererLoad, Statistics
@@ -141,10 +141,10 @@ class Keeper:
         self.process = process
         self._events.began()
 
-    def _received(self, message: FromRenderer | Waiting) -> None:
+    def _received(self, message: FromRenderer | NoPlace) -> None:
         if isinstance(message, Ready):
             self._is_ready(message)
-        elif isinstance(message, Waiting):
+        elif isinstance(message, NoPlace):
             self._waits(message)
         elif isinstance(message, Unable):
             self.detail = message.detail
@@ -154,7 +154,7 @@ class Keeper:
         else:
             self._events.received(message)
 
-    def _waits(self, message: Waiting) -> None:
+    def _waits(self, message: NoPlace) -> None:
         if message.detail != self.waiting:
             level = logging.WARNING if message.needed else logging.INFO
             log.log(level, "a renderer waits", {"renderer": self._id, "reason": message.detail})

@@ -49,7 +49,7 @@ class Link(Protocol):
 
 
 @dataclass(frozen=True)
-class Waiting:
+class NoPlace:
     """Says, in place of a renderer that has no place to begin at, what it waits for."""
 
     detail: str

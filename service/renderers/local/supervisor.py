@@ -34,7 +34,7 @@ from service.ipc.messages import (
 )
 from service.ipc.task_control import Drop
 from service.problems import MISTAKE, Unavailable
-from service.renderers.local.events import Alone, Events
+from service.renderers.local.events import Events, NoEvents
 from service.renderers.local.keeper import CLOSING, Keeper
 from service.renderers.local.process import Cause, Options, Process, RendererProcess, Start
 from service.renderers.local.restarts import BY_OTHERS
@@ -68,7 +68,7 @@ class Supervisor:
         options = replace(options or Options(), name=self.place.id)
         self._numbers = numbers or itertools.count(1)
         self.tasks: dict[int, Task] = {}  # those that were opened here, or taken over, by their numbers
-        self._events = events or Alone()
+        self._events = events or NoEvents()
         self._keeper = Keeper(
             self.place.id, start or partial(Process, options), options.patience_s, self.statistics, self
         )

@@ -49,7 +49,7 @@ class Pool:
         self.statistics = ClientStatistics()
         numbers = itertools.count(1)
         self.supervisors = [
-            Supervisor(seat.options, seat.start, seat.place, numbers, _Seated(self, number))
+            Supervisor(seat.options, seat.start, seat.place, numbers, _RendererEvents(self, number))
             for number, seat in enumerate(seats)
         ]
         self.homes: dict[int, Supervisor] = {}  # which of them works on it, by open task
@@ -239,7 +239,7 @@ class Pool:
         return "server" if task_record is None else task_record.kind
 
 
-class _Seated(Events):
+class _RendererEvents(Events):
     """The pool's answers to the events of one of its renderers."""
 
     def __init__(self, pool: Pool, number: int) -> None:

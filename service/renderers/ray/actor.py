@@ -15,7 +15,7 @@ from service.ipc.messages import FromRenderer, Ready, SceneData, ToRenderer, Upd
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.devices import listed, of_cuda
 from service.renderers.ray.code import version
-from service.renderers.ray.control import Ended
+from service.renderers.ray.control import ProcessEnded
 from service.system.background import Background, reported, within
 from service.system.memory import MemoryBudget
 
@@ -30,7 +30,7 @@ class Renderer:
 
     def __init__(self) -> None:
         self._process: Process | None = None
-        self._outgoing: deque[FromRenderer | Ended] = deque()
+        self._outgoing: deque[FromRenderer | ProcessEnded] = deque()
         self._news = asyncio.Event()
         self._paused = False
         self._chores = Background()
@@ -73,7 +73,7 @@ class Renderer:
         else:
             channel.discard(encoded)
 
-    async def hear(self) -> list[FromRenderer | Ended]:
+    async def hear(self) -> list[FromRenderer | ProcessEnded]:
         """The renderer's messages since the last call, as soon as there are some; an empty list after a while."""
         outgoing, news = self._outgoing, self._news
         if not outgoing:
@@ -108,9 +108,11 @@ class Renderer:
             self._process = None
             self._chores.start("end of a renderer", self._bury(process, self._outgoing, self._news))
 
-    async def _bury(self, process: Process, outgoing: deque[FromRenderer | Ended], news: asyncio.Event) -> None:
+    async def _bury(
+        self, process: Process, outgoing: deque[FromRenderer | ProcessEnded], news: asyncio.Event
+    ) -> None:
         cause = await process.end(LAST_WORDS_S)
-        outgoing.append(Ended(cause, process.task))
+        outgoing.append(ProcessEnded(cause, process.task))
         news.set()
 
     async def _watch(self, process: Process, pause_s: float) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from service.ipc import channel
-from service.renderers.local.process import ROOT, Start, Waiting
+from service.renderers.local.process import ROOT, NoPlace, Start
 from service.renderers.ray import control
 from service.renderers.ray.control import Join, Joined, Open, Refused, Release
 from service.renderers.ray.joining import INSTALL, CannotJoin
@@ -71,7 +71,7 @@ class Cluster:
         """A renderer's share of its node, as /v1/info says it."""
         return described(self.joined.resources)
 
-    def rest(self, number: int) -> None:
+    def release_node(self, number: int) -> None:
         """Give what a renderer has back to the cluster, until it is woken; meanwhile it says that it waits."""
         if number not in self._resting:
             self._resting[number] = None
@@ -115,7 +115,7 @@ class Cluster:
             if (before := self._resting[number]) is not None:
                 before.close()
             self._resting[number] = end.dup()
-            channel.send(end, Waiting(RESTS, needed=False))
+            channel.send(end, NoPlace(RESTS, needed=False))
             return 0 if self._gateway is None else self._gateway.process.pid
         if self._gateway is not None:
             with suppress(OSError):

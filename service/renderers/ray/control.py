@@ -63,7 +63,7 @@ class Release:
 
 
 @dataclass(frozen=True)
-class Ended:
+class ProcessEnded:
     """The last message: why the renderer ended, and the task that it worked on (0: none)."""
 
     cause: str

@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 from service.ipc import channel
-from service.renderers.local.process import Waiting
+from service.renderers.local.process import NoPlace
 from service.renderers.ray import control
 from service.renderers.ray.actor import Renderer
 from service.renderers.ray.carriage import Scenes
@@ -195,7 +195,7 @@ def _refuse(end: socket.socket, detail: str) -> None:
         while (received := control.receive(end)) is not None:
             if received[1] is not None:
                 with socket.socket(fileno=received[1]) as lane, suppress(channel.Closed):
-                    channel.send(lane, Waiting(detail))
+                    channel.send(lane, NoPlace(detail))
     logging.shutdown()
     os._exit(1)
 

@@ -17,10 +17,10 @@ from service.ipc.messages import Failed, FromRenderer, ToRenderer, Unable, Updat
 from service.ipc.server_end import Channel
 from service.ipc.task_control import Drop, TakeCheckpoint
 from service.problems import MISTAKE
-from service.renderers.local.process import Waiting
+from service.renderers.local.process import NoPlace
 from service.renderers.ray.carriage import LARGE, Scenes, size, stored
 from service.renderers.ray.code import difference
-from service.renderers.ray.control import Ended
+from service.renderers.ray.control import ProcessEnded
 from service.system.background import Background
 
 SILENCE_S = 30.0  # without an answer from an actor, which gives one every 5 s, until it is given up
@@ -101,7 +101,7 @@ class Lane:
                 self._received(TakeCheckpoint(task))
             asyncio.get_running_loop().call_later(DRAIN_S, self._actors.restart, self.number)
 
-    async def _work(self) -> Ended:
+    async def _work(self) -> ProcessEnded:
         """Carry messages until the renderer has ended; why it did."""
         from ray.exceptions import RayActorError, RayError
 
@@ -124,7 +124,7 @@ class Lane:
                             await _answer(actor.end.remote(FAREWELL_S))
         except Unfit as error:
             self._link.send(Unable(str(error)))
-            return Ended("crashed")
+            return ProcessEnded("crashed")
         except TimeoutError:
             log.error("an actor did not answer", {"renderer": self.number, "seconds": round(SILENCE_S)})
             self._actors.restart(self.number)
@@ -133,7 +133,7 @@ class Lane:
         except RayError as error:
             log.error("Ray failed", {"renderer": self.number, "error": _said(error)})
             self._actors.restart(self.number)
-        return Ended(self._loss)
+        return ProcessEnded(self._loss)
 
     async def _begun(self) -> Any:
         """The actor with a renderer that has just been started. Raises Unfit, RayActorError."""
@@ -160,7 +160,7 @@ class Lane:
         answer = asyncio.ensure_future(_answer(actor.describe.options(max_task_retries=-1).remote()))
         while not (await asyncio.wait({answer}, timeout=PLACING_S))[0]:
             if why := await asyncio.to_thread(self._actors.placing, self.number):
-                self._link.send(Waiting(why))
+                self._link.send(NoPlace(why))
         there: dict[str, Any] = await answer
         return there
 
@@ -224,11 +224,13 @@ class Lane:
         self._incoming.extendleft(reversed(self._behind.pop(message.task)))
         self._news.set()
 
-    async def _hear_all(self, actor: Any) -> Ended:
+    async def _hear_all(self, actor: Any) -> ProcessEnded:
         while True:
             async with asyncio.timeout(SILENCE_S):
                 messages = await _answer(actor.hear.remote())
-            last: Ended | None = messages.pop() if messages and isinstance(messages[-1], Ended) else None
+            last: ProcessEnded | None = (
+                messages.pop() if messages and isinstance(messages[-1], ProcessEnded) else None
+            )
             for encoded in await asyncio.to_thread(_encoded, messages):
                 self._link.send_encoded(encoded)
             if last is not None:

@@ -36,7 +36,7 @@ class ClusterPool(Pool):
             [Seat(Place(str(n), cluster.device, ""), options, cluster.starter(n)) for n in range(self._count)]
         )
         for number in range(max(1, cluster.joined.room), self._count):  # nodes are added for work, not for a start
-            cluster.rest(number)
+            cluster.release_node(number)
 
     def start(self) -> None:
         super().start()
@@ -53,9 +53,9 @@ class ClusterPool(Pool):
         while True:
             await asyncio.sleep(LOOK_S)
             with reported("look at the cluster's load"):
-                self.settle(time.monotonic())
+                self.resize(time.monotonic())
 
-    def settle(self, now: float) -> None:
+    def resize(self, now: float) -> None:
         """Ask the cluster for as many renderers as there are tasks; for all when work lasts, for one after none."""
         active = sum(task.active for each in self.supervisors for task in each.tasks.values())
         if active:
@@ -72,7 +72,7 @@ class ClusterPool(Pool):
             stays = next((number for number in awake if self.supervisors[number].info is not None), awake[0])
             for number in awake:
                 if number != stays:
-                    self._cluster.rest(number)
+                    self._cluster.release_node(number)
 
 
 def cluster_pool(config: Config) -> ClusterPool:

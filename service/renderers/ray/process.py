@@ -10,7 +10,7 @@ from typing import Any, cast
 from service.ipc import channel
 from service.ipc.server_end import Channel
 from service.renderers.local.process import Cause
-from service.renderers.ray.control import Ended
+from service.renderers.ray.control import ProcessEnded
 
 
 class ClusterProcess:
@@ -33,7 +33,7 @@ class ClusterProcess:
         self.began = time.monotonic()
         self.ready = False
         self.unable = False
-        self._received, self._ended = received, Ended("node lost")
+        self._received, self._ended = received, ProcessEnded("node lost")
         ours, theirs = channel.pair()
         try:
             self.id = carry(theirs)
@@ -58,7 +58,7 @@ class ClusterProcess:
         return cast(Cause, self._ended.cause)
 
     def _heard(self, message: Any) -> None:
-        if isinstance(message, Ended):
+        if isinstance(message, ProcessEnded):
             self._ended = message
         else:
             self._received(message)

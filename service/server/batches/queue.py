@@ -118,7 +118,7 @@ class BatchQueue:
     async def render_of(self, batch: Batch, step: int) -> Render:
         """A render that was made. Raises Gone."""
         renders, id = self._renders, member_id(batch.id, step)
-        return await looked_at(batch, step, id, renders.store, renders.resting, self._made_ended)
+        return await looked_at(batch, step, id, renders.store, renders.loaded_pictures, self._made_ended)
 
     def _place(self, id: str, owner: str) -> tuple[Batch, int] | None:
         """The batch of a render, and its place in it."""

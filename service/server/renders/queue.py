@@ -17,7 +17,15 @@ from service.server.renders.documents import WaitingDocuments
 from service.server.renders.followers import Follower, Followers
 from service.server.renders.recorder import Recorder
 from service.server.renders.render import InBatch, Render
-from service.server.renders.retention import QueueLimits, Resting, RetainedRenders, forget, in_memory, settle, take_up
+from service.server.renders.retention import (
+    LoadedPictures,
+    QueueLimits,
+    RetainedRenders,
+    forget,
+    in_memory,
+    settle,
+    take_up,
+)
 from service.server.renders.scene import PackedScenes
 from service.server.renders.slots import Slots
 from service.server.renders.store.batch_rows import BatchOrder
@@ -47,13 +55,13 @@ class RenderQueue:
         self._followers = Followers[Render]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
-        self._slots = Slots(self.limits.running, self._ran)
+        self._slots = Slots(self.limits.running, self._on_finished)
         self._waiting = self._slots.waiting
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._documents = WaitingDocuments(self.limits.disk_bytes)
         self._retained: RetainedRenders[Render | InBatch] = RetainedRenders(self.limits.retention)
-        self.resting = Resting()
+        self.loaded_pictures = LoadedPictures()
         self._chores = Background()
         self._timer: asyncio.TimerHandle | None = None
         self.closing = False
@@ -225,7 +233,7 @@ class RenderQueue:
     def _know(self, job: Render) -> None:
         """Find it by its id from now on, and its picture where memory is taken from."""
         self._jobs[job.id] = job
-        job.resting = self.resting
+        job.loaded_pictures = self.loaded_pictures
 
     async def close(self) -> None:
         """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""
@@ -282,9 +290,9 @@ class RenderQueue:
                     raise
                 await forget(self._drop(goes), self.store)
 
-    def _ran(self, job: Render) -> None:
+    def _on_finished(self, job: Render) -> None:
         if job.finished.is_set() and job.id in self._jobs:
-            self.resting.add(job)
+            self.loaded_pictures.add(job)
         self._ended(job)
 
     def _ended(self, job: Render) -> None:
@@ -368,7 +376,7 @@ class RenderQueue:
             for job in in_memory(each) if isinstance(each, InBatch) else [each]:
                 job.release()
                 self._jobs.pop(job.id, None)
-                self.resting.remove(job)
+                self.loaded_pictures.remove(job)
             if isinstance(each, InBatch):
                 each.gone = True
                 stored.append(each)

@@ -93,7 +93,7 @@ class Render(Listener):
     counts_as = 1  # of the renders of its owner that are kept
     waits = False  # for memory, the disk or a renderer, which was logged
     batch: InBatch | None = None  # which has the document, and learns of the end
-    resting: KeepsPictures | None = None  # None: the caller releases it
+    loaded_pictures: KeepsPictures | None = None  # None: the caller releases it
     task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it
     ended_at = 0.0  # by the monotonic clock, once it has ended
     _has_slot = False
@@ -515,7 +515,7 @@ class Render(Listener):
         self._drop_task()
         self.scene.forget_document()
 
-    def rest(self) -> bool:
+    def unload(self) -> bool:
         """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""
         possible = self.picture_at is PictureAt.BOTH and not self.viewer.busy
         if possible:

@@ -141,7 +141,7 @@ class RetainedRenders(Generic[T]):
         return render
 
 
-class Resting:
+class LoadedPictures:
     """For the event loop, but for `shrink`."""
 
     def __init__(self) -> None:
@@ -151,7 +151,7 @@ class Resting:
     @property
     def bytes(self) -> int:
         """About the memory that they take."""
-        return sum(each.resident_bytes for each in self._renders.values() if _rests(each))
+        return sum(each.resident_bytes for each in self._renders.values() if _has_idle_picture(each))
 
     def add(self, job: Render) -> None:
         """Keep a render that has ended, or waits, with the renderer if it is there, and let others go that have not
@@ -160,14 +160,14 @@ class Resting:
         self._renders.pop(job.id, None)
         self._renders[job.id] = job
         for each in list(self._renders.values()):
-            if not _rests(each):
+            if not _has_idle_picture(each):
                 del self._renders[each.id]
         total = self.bytes
         for each in list(self._renders.values())[:-1]:
             if total <= RESTING_BYTES and len(self._renders) <= RESTING:
                 break
             size = each.resident_bytes
-            if each.rest():
+            if each.unload():
                 total -= size
                 del self._renders[each.id]
 
@@ -195,12 +195,12 @@ class Resting:
             if size <= 0:
                 break
             freed = job.resident_bytes
-            if job.rest():
+            if job.unload():
                 size -= freed
                 del self._renders[job.id]
 
 
-def _rests(job: Render) -> bool:
+def _has_idle_picture(job: Render) -> bool:
     """True if a renderer has its picture and adds nothing to it: it ended, or it gave way and was looked at."""
     return job.resident_bytes > 0 and (job.finished.is_set() or job.picture_at is PictureAt.BOTH)
 
@@ -225,17 +225,17 @@ async def settle(job: Render, batch: InBatch, jobs: dict[str, Render]) -> None:
 
 
 async def looked_at(
-    batch: InBatch, step: int, id: str, store: RenderStore | None, resting: Resting, make: Make
+    batch: InBatch, step: int, id: str, store: RenderStore | None, loaded_pictures: LoadedPictures, make: Make
 ) -> Render:
-    """A render of a batch, brought back from the store where it is not in memory; its picture stays with `resting`.
-    Raises Gone."""
+    """A render of a batch, brought back from the store where it is not in memory; its picture stays with
+    `loaded_pictures`. Raises Gone."""
     job: Render | None = batch.job(step)
     if job is None and store is not None:
         stored = await store.one(id)
         job = batch.job(step)  # others may have been faster
         if job is None and stored is not None:
             job = batch.shown[step] = make(stored.order, stored.outcome)
-            job.number, job.batch, job.resting = stored.number, batch, resting
+            job.number, job.batch, job.loaded_pictures = stored.number, batch, loaded_pictures
             job.recorder = Recorder(store, stored.number, id, True, job.renderers, job.owner)
     if job is None or batch.gone:
         raise Gone("This render was deleted with its batch, or made room for newer ones.")

@@ -16,7 +16,7 @@ from itertools import chain, islice
 from typing import Protocol, TypeVar
 
 from service.server.renders.render import Render
-from service.server.renders.turns import Turns
+from service.server.renders.turns import FairQueue
 from service.system.background import Background, reported
 
 AGAIN_S = 5.0  # between two attempts to begin a render that waits for memory, the disk or a renderer
@@ -43,7 +43,7 @@ class Slots:
         self, most: int, ended: Callable[[Render], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         """`ended` is called with each render whose slot is free for good."""
-        self.waiting: Turns[Render] = Turns()
+        self.waiting: FairQueue[Render] = FairQueue()
         self.closing = False
         self._most = most
         self._ended = ended
@@ -51,11 +51,11 @@ class Slots:
         self._running: dict[asyncio.Task[None], Render] = {}
         self._recent = Recent(clock)
         self._since: dict[Render, float] = {}  # when each that waits came into line
-        self._lacking: dict[Render, float] = {}  # those that something is missing for, since when, the longest first
-        self._tried: dict[Render, None] = {}  # of these, those that are not to be tried just now, the next ones first
+        self._starved: dict[Render, float] = {}  # those that something is missing for, since when, the longest first
+        self._retry_later: dict[Render, None] = {}  # of these, those that are not tried now, the next ones first
         self._tried_at = 0.0
-        self._claim: Render | None = None  # the one that others are giving way to
-        self._leaving: set[Render] = set()  # these others
+        self._claimant: Render | None = None  # the one that others are giving way to
+        self._yielding: set[Render] = set()  # these others
         self._timer: asyncio.TimerHandle | None = None
         self._tasks = Background()
 
@@ -71,8 +71,8 @@ class Slots:
 
     def remove(self, job: Render) -> bool:
         """True if it was waiting."""
-        self._lacking.pop(job, None)
-        self._tried.pop(job, None)
+        self._starved.pop(job, None)
+        self._retry_later.pop(job, None)
         self._since.pop(job, None)
         return self.waiting.remove(job)
 
@@ -95,8 +95,8 @@ class Slots:
     @property
     def _free(self) -> int:
         """Slots that nobody has, without the one that others give way for."""
-        stay = sum(job not in self._leaving for job in self._running.values())
-        return self._most - max(len(self._running), stay + (self._claim is not None))
+        stay = sum(job not in self._yielding for job in self._running.values())
+        return self._most - max(len(self._running), stay + (self._claimant is not None))
 
     def _may_have_one(self, owner: str) -> bool:
         """True if an owner may have a slot that is free. While several owners have renders here, or had within the
@@ -112,7 +112,7 @@ class Slots:
             if self._clock() - self._tried_at >= AGAIN_S:
                 self._try_again()
             self.dispatch()
-            if self._claim is None and not self.closing:
+            if self._claimant is None and not self.closing:
                 self._make_way()
 
     def _look_later(self) -> None:
@@ -120,50 +120,50 @@ class Slots:
             self._timer = asyncio.get_running_loop().call_later(LOOK_S, self._look)
 
     def _try_again(self) -> None:
-        for job in list(islice(self._tried, AT_ONCE)):
-            del self._tried[job]
+        for job in list(islice(self._retry_later, AT_ONCE)):
+            del self._retry_later[job]
         self._tried_at = self._clock()
 
     def _start(self, job: Render) -> None:
-        self._lacking.pop(job, None)
+        self._starved.pop(job, None)
         self._since.pop(job, None)
         self._recent.begins(job)
         task = self._tasks.start("render", job.run(), job.died)
         self._running[task] = job
-        task.add_done_callback(self._ran)
+        task.add_done_callback(self._on_finished)
 
-    def _ran(self, task: asyncio.Task[None]) -> None:
+    def _on_finished(self, task: asyncio.Task[None]) -> None:
         job = self._running.pop(task)
         self._recent.ends(job)
-        if job in self._leaving and not job.finished.is_set():
+        if job in self._yielding and not job.finished.is_set():
             return
         if job.finished.is_set() or self.closing:
             self._try_again()  # it gave its memory back
             self._ended(job)
         else:
             self.add(job)
-            self._lack(job)
+            self._starve(job)
         self.dispatch()
 
-    def _lack(self, job: Render) -> None:
-        self._lacking.setdefault(job, self._clock())
-        self._tried[job] = None
+    def _starve(self, job: Render) -> None:
+        self._starved.setdefault(job, self._clock())
+        self._retry_later[job] = None
 
     def _fits(self, job: Render) -> bool:
         """True if it may begin now; its memory is counted then."""
-        if job in self._tried or self._yields_memory(job) or not self._in_share(job):
+        if job in self._retry_later or self._yields_memory(job) or not self._in_share(job):
             return False
         if job.reserve():
             return True
-        self._lack(job)
+        self._starve(job)
         return False
 
     def _yields_memory(self, job: Render) -> bool:
         """True while a large render is waiting for memory that this one would use: no stream of renders starves it.
 
         Only for half of the time, as what that one waits for may be endless."""
-        first = next(iter(self._lacking), job)
-        waited = self._clock() - self._lacking.get(first, self._clock())
+        first = next(iter(self._starved), job)
+        waited = self._clock() - self._starved.get(first, self._clock())
         return first is not job and int(waited / PATIENCE_S) % 2 == 1 and job.memory_share > 1 / (SMALL * self._most)
 
     def _in_share(self, job: Render) -> bool:
@@ -185,7 +185,7 @@ class Slots:
             free = self._free if self._may_have_one(waiting.owner) else 0
             chosen = giving_way(waiting, running, free, waiting.lacks)
             if chosen:
-                self._claim, self._leaving = waiting, set(chosen)
+                self._claimant, self._yielding = waiting, set(chosen)
                 self._tasks.start("hand-over of slots", self._give_way(waiting, chosen), self._gave_up)
                 return
 
@@ -207,24 +207,24 @@ class Slots:
         return began + list(islice((job for job in line if not job.began), FEW))
 
     async def _give_way(self, waiting: Render, chosen: list[Render]) -> None:
-        tasks = {job: task for task, job in self._running.items() if job in self._leaving}
+        tasks = {job: task for task, job in self._running.items() if job in self._yielding}
         gave = await asyncio.gather(*(job.give_way() for job in chosen))
         for job, gives in zip(chosen, gave, strict=True):
             if gives:
                 await asyncio.wait([tasks[job]])
                 log.info("a render gave way to another one", {"id": job.id[:6], "to": waiting.id[:6]})
-        await asyncio.sleep(0)  # for `_ran`
+        await asyncio.sleep(0)  # for `_on_finished`
         self._handed_over(waiting)
 
     def _gave_up(self, error: Exception) -> None:
         """An error of the server ended the hand-over: renders that gave their slots back by then queue again."""
-        if self._claim is not None:
-            self._handed_over(self._claim)
+        if self._claimant is not None:
+            self._handed_over(self._claimant)
 
     def _handed_over(self, waiting: Render) -> None:
-        left = self._leaving - set(self._running.values())
-        self._claim, self._leaving = None, set()
-        self._tried.pop(waiting, None)
+        left = self._yielding - set(self._running.values())
+        self._claimant, self._yielding = None, set()
+        self._retry_later.pop(waiting, None)
         if waiting in self.waiting and not self.closing and self._free > 0 and self._fits(waiting):
             self.waiting.take(waiting)
             self._start(waiting)

@@ -11,7 +11,7 @@ from typing import Generic, Protocol, TypeVar
 REMEMBERED = 1000  # owners whose last turn counts
 
 
-class Waiting(Protocol):
+class QueueItem(Protocol):
     place: int  # in the order of arrival; 0 before it came
 
     @property
@@ -25,10 +25,10 @@ class Waiting(Protocol):
         """True if it was running when the server ended, or gave way: it goes on before its owner's others begin."""
 
 
-T = TypeVar("T", bound=Waiting)
+T = TypeVar("T", bound=QueueItem)
 
 
-class Turns(Generic[T]):
+class FairQueue(Generic[T]):
     """Renders that wait. An owner of whose renders fewer run goes first, then the one whose turn is longer ago."""
 
     def __init__(self) -> None:
@@ -105,5 +105,5 @@ class Turns(Generic[T]):
         return running[owner], not first.began, self._last.get(owner, -1), first.place
 
 
-def _key(render: Waiting) -> tuple[bool, int, int]:
+def _key(render: QueueItem) -> tuple[bool, int, int]:
     return not render.began, -render.priority, render.place

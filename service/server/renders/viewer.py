@@ -37,7 +37,7 @@ class Shown(Protocol):
     renderers: Renderers
     scene: RenderScene
     recorder: Recorder | None
-    resting: KeepsPictures | None
+    loaded_pictures: KeepsPictures | None
     task: int | None
 
     async def document(self) -> bytes: ...
@@ -77,8 +77,8 @@ class PictureViewer(Listener):
             image = await self._reads.ask(view, task, self._render.renderers.send)
         finally:
             self._waiting -= 1
-            if not self._waiting and self._render.resting is not None:
-                self._render.resting.add(self._render)
+            if not self._waiting and self._render.loaded_pictures is not None:
+                self._render.loaded_pictures.add(self._render)
         if image.pixels is None:
             raise Conflict("There is no sample yet.")
         return image.pixels, image.progress

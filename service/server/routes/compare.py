@@ -27,7 +27,7 @@ from service.server.routes import answers, compare_answers, submission, waiting
 from service.server.routes.errors import GONE
 from service.server.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.server.verdict import comparison
-from service.server.verdict.comparison import Side, Source, Still, Taken, UnderWay, Verdict, ways_of
+from service.server.verdict.comparison import SampleSource, Side, Still, Taken, UnderWay, Verdict, ways_of
 from service.server.verdict.evidence import PIXEL_BYTES, Estimate
 from service.system.executors import comparing, opening, packing, storing
 from service.views import MapKind
@@ -111,7 +111,7 @@ async def _answered(
         a, b = await sides.found(asked.a, "/a"), await sides.found(asked.b, "/b")
         check_sizes(a.size, b.size)
         hold_pictures(a.size[0] * a.size[1] * PIXEL_BYTES)
-        if asked.same and isinstance(a, Source):
+        if asked.same and isinstance(a, SampleSource):
             verdict = comparison.same(a, asked.confidence)
         else:
             verdict = await comparison.compare(a, b, asked.confidence, on_progress)
@@ -150,7 +150,7 @@ class _Sides:
             raise InvalidDocument([FieldError(pointer, error.detail)]) from None
         return still
 
-    async def _document(self, parsed: ParsedRequest, pointer: str) -> Source:
+    async def _document(self, parsed: ParsedRequest, pointer: str) -> SampleSource:
         try:
             check_pixels(parsed.settings.render_width, parsed.settings.render_height)
             packed = await packing(partial(self.state.reader.pack, parsed.scene, owner=self.owner))
@@ -159,7 +159,7 @@ class _Sides:
         self.state.memory.release(packed)
         self.scene_bytes += packed.bytes
         self.hold_scenes(self.scene_bytes)
-        return Source(parsed.settings, partial(self._rendered, parsed.document, packed, pointer))
+        return SampleSource(parsed.settings, partial(self._rendered, parsed.document, packed, pointer))
 
     async def _rendered(self, document: bytes, packed: Packed, pointer: str, settings: ResolvedSettings) -> Taken:
         """One group of samples: a render as `POST /v1/render` has it, with the same limits and turns."""

@@ -152,8 +152,8 @@ def _memory(state: AppState, members: Sequence[Member]) -> Iterator[Metric]:
     stored = {member.place.id: float(member.statistics.load.bytes) for member in members}
     yield _gauges("gpu_bytes", "GPU memory that they take.", "renderer", stored)
     yield _gauges("memory_bytes", "Memory of SUNBOX_MEMORY, by what is in it.", "owner", state.memory.used())
-    resting = state.render_queue.resting.bytes
-    yield _gauge("resting_bytes", "What ended renders take of it, until it is needed.", resting)
+    loaded_pictures = state.render_queue.loaded_pictures.bytes
+    yield _gauge("resting_bytes", "What ended renders take of it, until it is needed.", loaded_pictures)
     yield _gauge("memory_limit_bytes", "Most of it (SUNBOX_MEMORY).", state.memory.limit)
     here = socket.gethostname()
     resident = {each.place.id: float(_resident(each.process_id)) for each in members if each.place.host == here}

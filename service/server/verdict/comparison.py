@@ -57,7 +57,7 @@ class Taken:
 
 
 @dataclass(frozen=True)
-class Source:
+class SampleSource:
     """A document, of which samples can be taken: `render(settings)`. Raises what rendering raises."""
 
     settings: ResolvedSettings
@@ -76,7 +76,7 @@ class Source:
         return self.settings.max_samples or USUAL_SAMPLES
 
 
-Side = Still | Source
+Side = Still | SampleSource
 # Called with the samples of each pixel that are taken, and those that may be taken at most.
 OnProgress = Callable[[int, int], None]
 
@@ -113,11 +113,11 @@ class Verdict:
 async def compare(a: Side, b: Side, confidence: float, on_progress: OnProgress = lambda taken, most: None) -> Verdict:
     """The verdict on two sides of the same size. Cancelled, it ends what it renders."""
     alpha = 1.0 - confidence
-    if isinstance(a, Source) and isinstance(b, Source):
+    if isinstance(a, SampleSource) and isinstance(b, SampleSource):
         evidence, decision = await _of_two_documents(a, b, alpha, on_progress)
-    elif isinstance(a, Source) and isinstance(b, Still):
+    elif isinstance(a, SampleSource) and isinstance(b, Still):
         evidence, decision = await _of_one_document(a, b, "a", alpha, on_progress)
-    elif isinstance(a, Still) and isinstance(b, Source):
+    elif isinstance(a, Still) and isinstance(b, SampleSource):
         evidence, decision = await _of_one_document(b, a, "b", alpha, on_progress)
     else:
         assert isinstance(a, Still) and isinstance(b, Still)
@@ -126,7 +126,7 @@ async def compare(a: Side, b: Side, confidence: float, on_progress: OnProgress =
     return await comparing(partial(_verdict, evidence, decision, alpha))
 
 
-def same(source: Source, confidence: float) -> Verdict:
+def same(source: SampleSource, confidence: float) -> Verdict:
     """The verdict on a document and itself, of which nothing is rendered."""
     width, height = source.size
     nothing = np.zeros((height, width, 3))
@@ -148,7 +148,7 @@ def same(source: Source, confidence: float) -> Verdict:
 class _Limits:
     """The limits of a comparison beside its samples: the settings' time and noise."""
 
-    def __init__(self, *sources: Source) -> None:
+    def __init__(self, *sources: SampleSource) -> None:
         limits = [each.settings.time_limit for each in sources]
         self._left_s = min((limit for limit in limits if limit is not None), default=math.inf)
         self._noises = [each.settings.target_noise for each in sources]
@@ -172,7 +172,9 @@ class _Limits:
         return self._left_s <= 0 or quiet
 
 
-async def _of_two_documents(a: Source, b: Source, alpha: float, on_progress: OnProgress) -> tuple[Evidence, Decision]:
+async def _of_two_documents(
+    a: SampleSource, b: SampleSource, alpha: float, on_progress: OnProgress
+) -> tuple[Evidence, Decision]:
     schedule, limits = of_two_documents(min(a.samples, b.samples), a.settings.seed), _Limits(a, b)
     evidence, best = None, Decision()
     for done, group in enumerate(schedule.groups):
@@ -194,7 +196,7 @@ async def _of_two_documents(a: Source, b: Source, alpha: float, on_progress: OnP
 
 
 async def _of_one_document(
-    source: Source, still: Still, side: str, alpha: float, on_progress: OnProgress
+    source: SampleSource, still: Still, side: str, alpha: float, on_progress: OnProgress
 ) -> tuple[Evidence, Decision]:
     known = still.estimate.samples
     schedule, limits = of_one_document(source.samples, known, still.seed), _Limits(source)

@@ -247,8 +247,8 @@ def test_slots_go_on_after_a_hand_over_that_dies(dies: Any) -> None:
             slots.dispatch()
         now[0] = 60.0
         slots._look()
-        assert slots._claim is other
-        await until(lambda: slots._claim is None)
+        assert slots._claimant is other
+        await until(lambda: slots._claimant is None)
         assert dies("hand-over of slots")
         one.finished.set()
         await until(lambda: slots.running == [two, other])

@@ -208,7 +208,7 @@ def test_an_ended_render_is_a_row_until_somebody_looks_at_it(tmp_path: Path) -> 
         job = await batches.render(id, "anna")
         assert job is await batches.render(id, "anna")
         assert job.state == "done" and job.batch is batch and job.number
-        renders.resting.remove(job)
+        renders.loaded_pictures.remove(job)
         renderers.listeners.clear()
         del job
         gc.collect()
@@ -220,8 +220,8 @@ def test_an_ended_render_is_a_row_until_somebody_looks_at_it(tmp_path: Path) -> 
         batches = BatchQueue(renders, lambda batch, body: Members(batch, renderers), ended, 2)  # type: ignore[arg-type,return-value]
         batch = await batches.submit(order, b"", NO_USES, None)
         await until(lambda: batch.finished.is_set() and not batch.jobs)
-        for job in list(renders.resting._renders.values()):
-            renders.resting.remove(job)
+        for job in list(renders.loaded_pictures._renders.values()):
+            renders.loaded_pictures.remove(job)
         del job
         await looked_at(renders, batches, batch)
         told.append(batch.status())

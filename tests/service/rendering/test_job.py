@@ -177,7 +177,7 @@ def test_who_goes_away_while_a_picture_is_brought_back_leaves_it_to_others(tmp_p
         job.heard(Image(2, read.serial, np.zeros((4, 4, 4)), Progress(4)))
         assert (await patient)[1].samples == 4
         job.recorder.whole = True
-        assert job.rest() and renderers.sent[-1] == ("drop", 2)
+        assert job.unload() and renderers.sent[-1] == ("drop", 2)
 
     scenario(test, tmp_path)
 

@@ -106,7 +106,7 @@ class Black:
 def shown(policy: DenoisePolicy, noise: float | None, scale: float = 1.0) -> float:
     """How white what is shown of a black picture is."""
     black: Any = Black()
-    policy.begin(black, Progress(3, noise), fine=False, told=lambda: None, scale=scale)
+    policy.begin(black, Progress(3, noise), fine=False, on_done=lambda: None, scale=scale)
     assert policy.latest is not None and policy.latest.scale == scale
     assert np.ptp(policy.latest.pixels) == 0
     return float(policy.latest.pixels[0, 0, 0])

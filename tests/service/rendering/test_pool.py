@@ -25,7 +25,7 @@ from service.ipc.messages import (
 )
 from service.ipc.task_control import ApplyNow, Pause, Resume
 from service.problems import Unavailable
-from service.renderers.local.process import Waiting
+from service.renderers.local.process import NoPlace
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
 from tests.service.rendering.fakes import Fake
@@ -176,7 +176,7 @@ def test_tasks_of_one_that_waits_for_a_place_go_to_one_that_is_ready() -> None:
         fakes.processes[0].say(Checkpoint(saved, 1, Progress(4), SavedPicture(4, (0, 0, 0), [], "a")))
         fakes.processes[1].lose()
         await fakes.until("ready", "lost")
-        fakes.processes[0].say(Waiting("There is no room."))
+        fakes.processes[0].say(NoPlace("There is no room."))
         assert fakes.homes(begun, saved) == "00"  # they would wait there, too
         await fakes.until("ready", "ready")
         assert fakes.homes(begun, saved) == "10"  # from its checkpoint only one with its driver can go on

@@ -226,7 +226,7 @@ class RenderMachine(RuleBasedStateMachine):
     @rule()
     def memory_is_needed(self) -> None:
         at = self.job.picture_at
-        rested = self.job.rest()
+        rested = self.job.unload()
         assert rested is (at is PictureAt.BOTH)
         self.check()
 

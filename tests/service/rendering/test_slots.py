@@ -59,7 +59,7 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
         for id in range(8):
             await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", NO_USES)
         queue = RenderQueue(replace(LIMITS, running=8), store)
-        budget.cache("pictures", lambda: 0, queue.resting.shrink)
+        budget.cache("pictures", lambda: 0, queue.loaded_pictures.shrink)
         made = lambda stored: Render(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
         queue.resume(store.load(), made)
         stranger = Render(renderers, Order("stranger", "", SETTINGS), load, b"small", PACKED, budget=MemoryBudget())  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.texture_sets.baking import inverted, turned
 from service.formats.read.texture_sets.names import Role
 from service.formats.read.texture_sets.real_size import Size, by_names, by_note
-from service.formats.read.texture_sets.sets import Source, TextureSet, texture_sets
+from service.formats.read.texture_sets.sets import RoleImage, TextureSet, texture_sets
 from service.formats.types import AssetLimits, SceneFile
 
 MOST_MATERIALS = 1_000
@@ -82,7 +82,7 @@ class _Textures:
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
     _names: dict[tuple[str, str, str], str] = field(default_factory=dict)
 
-    def use(self, source: Source, role: Role) -> str:
+    def use(self, source: RoleImage, role: Role) -> str:
         """The name of the texture that shows an image in a role."""
         data = self.images[source.path]
         way = {"gloss": "roughness", "normal": "turned"}.get(role, "") if _is_baked(source, role) else ""
@@ -105,7 +105,7 @@ class _Textures:
         return self._names[key]
 
 
-def _is_baked(source: Source, role: Role) -> bool:
+def _is_baked(source: RoleImage, role: Role) -> bool:
     return role == "gloss" or (role == "normal" and bool(source.meaning.directx))
 
 

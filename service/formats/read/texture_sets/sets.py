@@ -17,7 +17,7 @@ LEFT_OUT: dict[Role, str] = {
 
 
 @dataclass(frozen=True)
-class Source:
+class RoleImage:
     """An image for one role, or the channel of one."""
 
     path: str
@@ -29,7 +29,7 @@ class Source:
 class TextureSet:
     """The images of one material, by role."""
 
-    sources: dict[Role, Source] = field(default_factory=dict)
+    sources: dict[Role, RoleImage] = field(default_factory=dict)
 
 
 def texture_sets(paths: Iterable[str], notes: Warnings) -> dict[str, TextureSet]:
@@ -62,7 +62,7 @@ def _chosen(images: list[tuple[str, Meaning]], notes: Warnings) -> TextureSet:
                     notes.add(path, LEFT_OUT[role])
                     taken = True
                 continue
-            target = out.sources.setdefault(role, Source(path, found, channel))
+            target = out.sources.setdefault(role, RoleImage(path, found, channel))
             taken = taken or target.path == path
         if not taken:
             others = {out.sources[role].path for role in found.channels if role in out.sources}

@@ -184,7 +184,7 @@ def test_a_renderer_that_is_not_needed_is_given_back(run: Run, cluster: Cluster,
     async def test(pool: Pool) -> None:
         assert pool.process_id is not None
         await until(lambda: all(member.state == "ready" for member in pool.members))
-        cluster.rest(1)
+        cluster.release_node(1)
         await until(lambda: restarts(pool, "released") == 1 and pool.supervisors[1].waiting == RESTS)
         await until(lambda: len(descendants(pool.process_id or 0, "ray::Renderer")) == 1)
         task, ears = await begun(pool)

@@ -25,7 +25,7 @@ class Counted:
         self.options = {"patience_s": 10.0}
         self.joined = Joined("head:6379", False, 8, {"GPU": 1.0}, room)
         self.resting = set[int]()
-        self.rest, self.wake = self.resting.add, self.resting.remove
+        self.release_node, self.wake = self.resting.add, self.resting.remove
 
     def starter(self, number: int) -> Start:
         return partial(Fake, "driver")  # type: ignore[return-value]
@@ -48,17 +48,17 @@ def test_renderers_come_with_the_work_and_go_after_it() -> None:
         await pool.ready(5)
         began = pool._idle_since
         first = [pool.open(Ears(), "render") for _ in range(3)]
-        pool.settle(began + 1)
+        pool.resize(began + 1)
         assert cluster.resting == set(range(3, 8))  # a renderer for each
-        pool.settle(began + 1 + LONG_S)
+        pool.resize(began + 1 + LONG_S)
         assert cluster.resting == set()  # the work lasts, and they divide it
         for task in first:
             pool.drop(task)
-        pool.settle(began + LONG_S + IDLE_S)
+        pool.resize(began + LONG_S + IDLE_S)
         assert cluster.resting == set()
-        pool.settle(began + 1 + LONG_S + IDLE_S)
+        pool.resize(began + 1 + LONG_S + IDLE_S)
         assert cluster.resting == set(range(1, 8))
-        pool.settle(began + 2 * IDLE_S)
+        pool.resize(began + 2 * IDLE_S)
         assert len(cluster.resting) == 7  # one is always there
         await pool.close()
 

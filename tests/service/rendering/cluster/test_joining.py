@@ -19,11 +19,11 @@ from service.config import ConfigError, load_config
 from service.ipc import channel
 from service.ipc.messages import Unable, Update
 from service.ipc.server_end import Channel
-from service.renderers.local.process import Waiting
+from service.renderers.local.process import NoPlace
 from service.renderers.ray import carriage, code, lane
 from service.renderers.ray.carriage import Scenes, digest
 from service.renderers.ray.cluster import Cluster
-from service.renderers.ray.control import Ended
+from service.renderers.ray.control import ProcessEnded
 from service.renderers.ray.joining import CannotJoin, close_token_file
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described, plan
@@ -178,7 +178,7 @@ async def told(actors: Actors, count: int) -> list[Any]:
 @pytest.mark.slow
 def test_a_node_with_other_code_is_told_apart() -> None:
     unable, ended = asyncio.run(told(Actors({"host": "far", "version": "0.0.9+abc"}), 2))
-    assert isinstance(unable, Unable) and ended == Ended("crashed")
+    assert isinstance(unable, Unable) and ended == ProcessEnded("crashed")
     for word in ("SUNBOX_RAY", "host far", "0.0.9+abc", code.version()):
         assert word in unable.detail
 
@@ -211,7 +211,7 @@ def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 @pytest.mark.slow
 def test_it_says_that_there_is_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lane, "PLACING_S", 0.01)
-    assert set(asyncio.run(told(Actors(None), 2))) == {Waiting("There is no room.")}
+    assert set(asyncio.run(told(Actors(None), 2))) == {NoPlace("There is no room.")}
 
 
 def test_equal_scenes_have_equal_digests() -> None:
