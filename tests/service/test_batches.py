@@ -164,8 +164,8 @@ def test_a_restart_goes_on(mortal: Server) -> None:
     """After a kill, with one render at a time; what was done stays, and the data folder is sound."""
     folder = mortal.folder / "data"
     id = started(mortal, [{"turntable": 5, "degrees": 90}], {**SMALL, "max_samples": 512})
-    gone = started(mortal, [ROUGHNESS], ENDLESS)
     wait_until(lambda: status(mortal, id)["counts"]["done"] >= 2)
+    gone = started(mortal, [ROUGHNESS], ENDLESS)  # later, as none of a key's renders interrupts another
     mortal.http.delete(f"/v1/batches/{gone}").raise_for_status()
     cut = started(mortal, [{"turntable": 3}], ENDLESS)
     before = {each["id"]: pixels(mortal, each["id"]) for each in status(mortal, id)["renders"][:2]}

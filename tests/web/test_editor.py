@@ -48,6 +48,7 @@ def test_controls_come_from_the_schema(editor: Editor) -> None:
     disney = next(model for model in schema["scene"]["$defs"].values() if "clearcoat_gloss" in model["properties"])
     editor.page.select_option("#model", "disney")
     editor.page.wait_for_selector("#material-form [data-field=clearcoat_gloss]", state="attached")
+    editor.page.wait_for_selector("#material-form [data-field=subsurface_radius]", state="detached")  # principled's
     editor.unfold()
     for name, field in disney["properties"].items():
         row = editor.page.locator(f"#material-form [data-field={name}]")
