@@ -63,7 +63,7 @@ def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
     said = editor.page.locator("#messages li").all_text_contents()
     assert any(line.startswith("The animation is left out: it ") for line in said), said
-    assert "Material 2: the occlusion texture is not used; occlusion is traced" in said, said
+    assert "Material 2: ambient occlusion is left out: the light that reaches a corner is traced" in said, said
     assert all(line[0].isupper() for line in said), said
 
     plain = gltf_files.Gltf()
