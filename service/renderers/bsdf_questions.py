@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import weakref
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from service.ipc.messages import EvaluateBsdf, Evaluated
 from service.renderers.ask import ask
 from service.renderers.protocol import Renderers
 from service.system.shares import Shares
+from service.system.turns import KeyedLocks
 
 MOST = 64  # short questions at a time, of all callers together; as many long ones, most of which wait
 LONG = 1 << 18  # samples: some 50 ms of two cores
@@ -25,7 +25,7 @@ class BsdfQuestions:
         self._renderers = renderers
         self._short = Shares(MOST, "questions about materials", retry_s=1)
         self._long = Shares(MOST, "long questions about materials")
-        self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()  # by caller
+        self._turns = KeyedLocks[str]()  # by caller
         self._slots = asyncio.Semaphore(LONG_AT_ONCE)
 
     async def ask(self, question: EvaluateBsdf, caller: str = "") -> dict[str, np.ndarray]:
@@ -38,8 +38,7 @@ class BsdfQuestions:
             with self._short.taken(caller):
                 return await self._answer(question)
         with self._long.taken(caller):
-            turn = self._turns.setdefault(caller, asyncio.Lock())
-            async with turn, self._slots:
+            async with self._turns.of(caller), self._slots:
                 return await self._answer(question)
 
     async def _answer(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:

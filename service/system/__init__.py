@@ -6,7 +6,8 @@ lifeline         a process ends when another one does
 cpu              how long a process was able to run; niceness of threads and processes
 shared_memory    arrays that another process may map
 memory           one budget of memory for all work
-shares           what each caller has of something that all share; turns that go round the callers
+shares           what each caller has of something that all share
+turns            whose turn it is: one order of callers for queues, threads and rooms
 garbage          the garbage collector, out of the way of large imports
 disk_usage       what files take on a disk: blocks and inodes
 background       tasks that nobody awaits, none of which dies unseen; waits for an event, for a time

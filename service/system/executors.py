@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from service.system.cpu import raise_thread_niceness, working_niceness
 from service.system.shares import CALLER
+from service.system.turns import FairQueue
 
 # Steps of niceness above the event loop and the encoders, as far as SUNBOX_NICE goes.
 NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
@@ -26,7 +27,7 @@ def _yield_to_others(niceness: int = NICENESS) -> None:
     raise_thread_niceness(working_niceness(niceness))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Work:
     run: Callable[[], Any]
     result: Future[Any]
@@ -36,9 +37,10 @@ class _Work:
 class Pool:
     """Threads for one kind of work, which waits for no other kind: `await pool(work, caller)`.
 
-    Turns go round the callers that have work here, and then in the order of arrival: a caller with much work delays
-    itself alone. None has more than `each` threads at a time: if work of minutes took all of them, nobody else would
-    have a turn until it ended. So a pool has one thread more than one caller alone needs.
+    The next work is that of the caller with the fewest threads, then of the one whose turn is the longest ago: a
+    caller with much work delays itself alone. None has more than `each` threads at a time: if work of minutes took
+    all of them, nobody else would have a turn until it ended. So a pool has one thread more than one caller alone
+    needs.
     """
 
     def __init__(self, name: str, threads: int, niceness: int = 0, each: int | None = None) -> None:
@@ -47,7 +49,7 @@ class Pool:
         self._most = threads
         self._each = max(1, threads - 1) if each is None else each
         self._lock = threading.Lock()
-        self._waiting = dict[str, deque[_Work]]()  # by caller; the first one's turn is next
+        self._waiting: FairQueue[_Work] = FairQueue(lambda work: work.caller)
         self._running: Counter[str] = Counter()  # works, by caller
         self._busy = 0  # threads that have work, or look for some
 
@@ -57,7 +59,7 @@ class Pool:
         context, result = copy_context(), Future[T]()
         context.run(CALLER.set, caller)
         with self._lock:
-            self._waiting.setdefault(caller, deque()).append(_Work(partial(context.run, work), result, caller))
+            self._waiting.add(_Work(partial(context.run, work), result, caller))
             if self._busy < self._most:
                 self._busy += 1
                 self._threads.submit(self._work)
@@ -76,15 +78,14 @@ class Pool:
     def _next(self) -> _Work | None:
         """The work whose turn it is; None where no caller may have another thread."""
         with self._lock:
-            caller = next((each for each in self._waiting if self._running[each] < self._each), None)
-            if caller is None:
+            work = self._waiting.first(
+                self._running.__getitem__, may=lambda caller: self._running[caller] < self._each
+            )
+            if work is None:
                 self._busy -= 1
                 return None
-            works = self._waiting.pop(caller)
-            work = works.popleft()
-            if works:
-                self._waiting[caller] = works  # behind the others
-            self._running += Counter([caller])  # which drops those that have none
+            self._waiting.take(work)
+            self._running += Counter([work.caller])  # which drops those that have none
             return work
 
 

@@ -21,8 +21,7 @@ NO_SERVER = ("bench", "cli")
 OF_FILES = ("formats", "document", "server/assets", "server/verdict")
 BOUNDING = {
     "BoundedSemaphore", "Children", "ClientExecutor", "Limit", "Pool", "ProcessPoolExecutor", "Queue", "Room",
-    "Semaphore", "Shares", "ThreadPoolExecutor", "FairQueue", "FairSemaphore", "_Room", "run_in_executor",
-    "to_thread",
+    "Semaphore", "Shares", "ThreadPoolExecutor", "FairQueue", "FairRoom", "run_in_executor", "to_thread",
 }  # fmt: skip
 BOUNDS = re.compile(
     r"AT_ONCE|(^|_)EACH$|^MOST$|OF_ONE|OPEN_OF|WAITS$|WAITING$|TOGETHER$|QUEUED$|REFUSALS|^ROOM$|LASTING$|FEW"
@@ -42,7 +41,7 @@ RAY = "carries all that a renderer is sent; of that turns go round clients"
 CODE = {
     "server/app.py to_thread": OWN,
     "formats/sandbox/sandbox.py self.children = Children": "one for each turn",
-    "formats/sandbox/sandbox.py self._turns = FairSemaphore": "all but one for one caller, the one with fewest first",
+    "formats/sandbox/sandbox.py self._room = FairRoom": "all but one for one caller, the one with fewest first",
     "server/app.py state = Pool": "renderers, whose time is divided among clients by the scheduler",
     "server/callbacks/queue.py AT_ONCE": SHARES,
     "server/callbacks/queue.py shares = Shares": SHARES,
@@ -62,6 +61,8 @@ CODE = {
     "server/http/guard.py (self._of_keys, self._of_addresses) = Shares": SHARES,
     "ipc/channel.py MOST": "descriptors of one message",
     "ipc/channel.py ROOM": "bytes of one message",
+    "system/executors.py self._waiting = FairQueue": ALL_BUT_ONE,
+    "system/turns.py self._waiting = FairQueue": "turns go round callers, and a pool's caller has all but one",
     "system/logs.py MOST_QUEUED": "lines of the log; beyond them lines are left out, and counted",
     "system/logs.py self.records = Queue": "lines of the log; beyond them lines are left out, and counted",
     "pack/geometry/parallel.py ThreadPoolExecutor": INSIDE,
@@ -89,7 +90,7 @@ CODE = {
     "server/requests/bodies.py AT_ONCE": LIMIT,
     "server/requests/bodies.py self._limit = Limit": LIMIT,
     "server/requests/parser_pool.py self._children = Children": "one for each thread of `waiting_for_parsers`",
-    "server/requests/parser_pool.py self._room = _Room": "turns go round callers, the one with fewest bytes first",
+    "server/requests/parser_pool.py self._room = FairRoom": "turns go round callers, the one with fewest bytes first",
     "server/requests/request_reader.py self.batch_memory = Limit": LIMIT,
     "server/requests/request_reader.py self.stream_memory = Limit": LIMIT,
     "server/routes/assets.py to_thread": PIECES,

@@ -27,7 +27,6 @@ from service.server.assets.folder import AssetFolder
 from service.server.assets.integrity import Integrity
 from service.server.renders.scene import PackedScenes
 from service.server.renders.store.pictures import PictureFiles
-from service.server.requests.parser_pool import _Room
 from service.server.storage.asset_shares import AssetShares
 from service.server.storage.quota import Quota
 from service.system import background, garbage, shared_memory
@@ -36,7 +35,8 @@ from service.system.child_processes import Children
 from service.system.disk_usage import Usage
 from service.system.executors import Pool
 from service.system.memory import MemoryBudget
-from service.system.shares import CALLER, FairSemaphore
+from service.system.shares import CALLER
+from service.system.turns import FairRoom
 from tests.service.rendering.stored import picture
 from tests.serving import wait_until
 
@@ -46,7 +46,6 @@ THREADS = 8
 CHANGED = {
     "renderers/ray/gateway.py _written": "appended to by one thread, and read as a whole",
     "server/renders/store/fitting.py _adapters": "the same value under a key, whoever makes it",
-    "server/routes/submission.py _turns": "of the event loop",
     "system/background.py _deaths": "a lock",
     "system/garbage.py _pauses": "a lock",
     "system/garbage.py _was_enabled": "a lock",
@@ -212,10 +211,11 @@ def _pictures(folder: Path) -> Hammer:
 
 
 def _room(folder: Path) -> Hammer:
-    room, inside = _Room(100), [0]
+    room, inside = FairRoom(100), [0]
     lock = threading.Lock()
 
     def turn(i: int) -> None:
+        CALLER.set(f"caller {i % 2}")
         with room.taken(i % 90):
             with lock:
                 inside[0] += i % 90
@@ -223,7 +223,7 @@ def _room(folder: Path) -> Hammer:
             with lock:
                 inside[0] -= i % 90
 
-    return turn, lambda: room._left == 100 and not room._waiting
+    return turn, lambda: room._left == 100 and not room._taken and not len(room._waiting)
 
 
 def _quota(folder: Path) -> Hammer:
@@ -295,19 +295,6 @@ def _budget(folder: Path) -> Hammer:
     return turn, clean
 
 
-def _turns(folder: Path) -> Hammer:
-    turns, inside = FairSemaphore(3), list[int]()
-
-    def turn(i: int) -> None:
-        CALLER.set(f"caller {i % 2}")
-        with turns.one():
-            inside.append(i)
-            assert len(inside) <= 3
-            inside.remove(i)
-
-    return turn, lambda: not turns._taken and not turns._waiting
-
-
 def _pool(folder: Path) -> Hammer:
     pool = Pool("hammered", 2, each=1)
 
@@ -360,12 +347,11 @@ HAMMERS: dict[str, Callable[[Path], Hammer]] = {
     "PackCache": _pack_cache,
     "PackedScenes": _packed_scenes,
     "PictureFiles": _pictures,
-    "_Room": _room,
     "Quota": _quota,
     "AssetShares": _asset_shares,
     "Children": _children,
     "MemoryBudget": _budget,
-    "FairSemaphore": _turns,
+    "FairRoom": _room,
     "Pool": _pool,
     "system/garbage.py": _garbage,
     "system/background.py": _deaths,

@@ -30,7 +30,7 @@ from service.formats.types import (
 )
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
-from service.system.shares import FairSemaphore
+from service.system.turns import FairRoom
 
 log = logging.getLogger(__name__)
 
@@ -79,7 +79,7 @@ class Sandbox:
 
     def __init__(self, limits: AssetLimits) -> None:
         self.limits = limits
-        self._turns = FairSemaphore(limits.children)
+        self._room = FairRoom(limits.children)
         self._asking = threading.Lock()
         self._rights: Rights | None = None
         self.children = Children("service.formats.sandbox.child", FILES, ENVIRONMENT)
@@ -124,7 +124,7 @@ class Sandbox:
     def _bounded(self, format: str, source: bytes | int, whole: bool, pose: Pose | None = None) -> Parsed:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
-            with self._turns.one():
+            with self._room.taken():
                 return self._parse(format, fd, whole, pose or Pose())
         finally:
             if isinstance(source, bytes):

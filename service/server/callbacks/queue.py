@@ -4,7 +4,6 @@ servers."""
 from __future__ import annotations
 
 import asyncio
-import itertools
 import json
 import logging
 import random
@@ -27,6 +26,7 @@ from service.server.storage.database import Database
 from service.system.background import Background, reported, within
 from service.system.executors import answering, recording, resolving
 from service.system.shares import CALLER, Shares
+from service.system.turns import Turns
 
 if TYPE_CHECKING:
     import ssl
@@ -62,7 +62,7 @@ class Callbacks:
         self.outcomes: Counter[str] = Counter()  # of attempts: delivered, retried, failed
         self._pending: Counter[str] = Counter()  # that have not ended, by owner
         self._sending = dict[str, Callback]()  # by id
-        self._turns, self._last = itertools.count(1), Counter[str]()  # the turn that each owner had last
+        self._turns = Turns()
         self._silences: Counter[str] = Counter()  # of hosts, since their last answer
         self._tasks = Background()
         self._woken = asyncio.Event()
@@ -154,7 +154,7 @@ class Callbacks:
             if found is None or left > 0:
                 return min(left, LONGEST_S)
             self._sending[found.id] = found
-            self._last[found.owner] = next(self._turns)
+            self._turns.had(found.owner)
             self._tasks.start(CALLBACK, self._attempt(found), partial(self._try_later, found))
         return LONGEST_S
 
@@ -164,7 +164,7 @@ class Callbacks:
         for each in self._sending.values():
             shares.count(each.owner)
         able = (owner for owner, count in self._pending.items() if count > 0 and shares.has_room(owner))
-        return sorted(able, key=lambda owner: (shares.of(owner), self._last[owner]))
+        return self._turns.order(able, shares.of)
 
     def _most_of(self, host: str) -> int:
         return 1 if self._silences[host] >= SILENCES else OF_ONE_HOST

@@ -25,6 +25,7 @@ from service.problems import TooLarge, Unavailable
 from service.system.disk_usage import FULL, trouble
 from service.system.memory import Holder, MemoryBudget
 from service.system.shares import Shares
+from service.system.turns import KeyedLocks
 
 SMALL = 1 << 20  # bytes of an answer that is made in memory, and needs no disk
 PIECE = 1 << 18  # bytes that are read and sent at a time
@@ -117,7 +118,7 @@ class Downloads:
     def __init__(self, folder: Path, memory: MemoryBudget | None = None) -> None:
         self._folder, self._memory = folder, memory or MemoryBudget()
         self._room = asyncio.Semaphore(AT_ONCE)
-        self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
+        self._turns = KeyedLocks[str]()
         self._lasting = OrderedDict[Hashable, Written]()  # the last ones that took long to make
         self._written: weakref.WeakValueDictionary[Hashable, Written] = weakref.WeakValueDictionary()
         self._shares = Shares(ROOM, "pictures that are being sent", retry_s=RETRY_S)  # bytes on the disk
@@ -125,8 +126,7 @@ class Downloads:
     @asynccontextmanager
     async def turn(self, caller: str) -> AsyncIterator[None]:
         """Wait for the caller's turn to have a picture written: each caller has one at a time."""
-        mine = self._turns.setdefault(caller, asyncio.Lock())
-        async with mine, self._room:
+        async with self._turns.of(caller), self._room:
             yield
 
     async def answer(

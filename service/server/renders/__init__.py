@@ -4,7 +4,6 @@ render      one render: its states, its task with a renderer, and its end
 states      the states, and where its picture may be
 queue       all renders, with bounds on how many wait, run and are kept
 slots       which renders run, which wait, and which give way to others
-turns       whose render starts next
 viewer      shows the picture of a render, from its task or from the disk
 scene       its scene, as a document while it waits and packed when it begins, and the memory that this takes
 documents   what the documents of renders that wait take on the disk, by owner

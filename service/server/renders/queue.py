@@ -164,13 +164,13 @@ class RenderQueue:
         """Raise what `submit` would raise, before a scene is read for nothing."""
         if self.closing:
             raise Unavailable("The server is shutting down.", RETRY_S)
-        theirs = self._waiting.count(owner) + self._storing[owner]
+        theirs = len(self._waiting.line(owner)) + self._storing[owner]
         active = theirs + sum(job.owner == owner for job in self._slots.running)
         if active >= self.limits.each:
             detail = f"{active} renders of yours are under way: no more than {self.limits.each} (SUNBOX_MAX_JOBS)"
             raise TooManyRequests(detail, RETRY_S)
         # A queue that is full still takes renders of owners with less than their share of it.
-        share = self.limits.waiting // max(1, len(self._waiting.owners) + (theirs == 0))
+        share = self.limits.waiting // max(1, len(self._waiting.callers) + (theirs == 0))
         if self.queued >= self.limits.waiting and theirs >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 

@@ -7,17 +7,19 @@ A render that gives way is stored and goes on later, so that it costs a checkpoi
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 from typing import Protocol, TypeVar
 
 from service.server.renders.render import Render
-from service.server.renders.turns import FairQueue
 from service.system.background import Background, reported
+from service.system.turns import FairQueue
 
 AGAIN_S = 5.0  # between two attempts to begin a render that waits for memory, the disk or a renderer
 LOOK_S = 1.0  # between two looks at the renders that wait
@@ -43,7 +45,8 @@ class Slots:
         self, most: int, ended: Callable[[Render], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         """`ended` is called with each render whose slot is free for good."""
-        self.waiting: FairQueue[Render] = FairQueue()
+        self.waiting: FairQueue[Render] = FairQueue(lambda job: job.owner, _place)
+        self._arrivals = itertools.count(1)
         self.closing = False
         self._most = most
         self._ended = ended
@@ -65,7 +68,8 @@ class Slots:
         return list(self._running.values())
 
     def add(self, job: Render) -> None:
-        """Have it wait; `dispatch` starts it when its turn comes."""
+        """Have it wait; `dispatch` starts it when its turn comes. One that has waited before has its place again."""
+        job.place = job.place or next(self._arrivals)
         self.waiting.add(job)
         self._since[job] = self._clock()
 
@@ -86,11 +90,16 @@ class Slots:
         """Start what may run."""
         while not self.closing and self._free > 0:
             running = Counter(job.owner for job in self._running.values())
-            job = self.waiting.next(running, self._fits, self._may_have_one)
+            job = self.waiting.first(partial(self._has, running), self._fits, self._may_have_one)
             if job is None:
                 break
+            self.waiting.take(job)
             self._start(job)
         self._look_later()
+
+    def _has(self, running: Counter[str], owner: str) -> tuple[int, bool]:
+        """How many renders of an owner run; among equals one whose render had begun goes on first."""
+        return running[owner], not self.waiting.line(owner)[0].began
 
     @property
     def _free(self) -> int:
@@ -104,7 +113,7 @@ class Slots:
         running = {job.owner for job in self._running.values()}
         if self._free > 1 or not owner or owner not in running:
             return True
-        return len({*running, *self.waiting.owners, *self._recent.owners}) == 1
+        return len({*running, *self.waiting.callers, *self._recent.owners}) == 1
 
     def _look(self) -> None:
         self._timer = None
@@ -178,7 +187,7 @@ class Slots:
         """Have others give way to a render that has waited for long, if that is fair."""
         now, running = self._clock(), self.running
         counts = Counter(job.owner for job in running)
-        owners = sorted(self.waiting.owners, key=lambda owner: counts[owner])
+        owners = sorted(self.waiting.callers, key=lambda owner: counts[owner])
         for waiting in islice(chain.from_iterable(map(self._firsts, owners)), AT_ONCE):
             if not (self._waited_enough(waiting, now - self._since[waiting]) and self._in_share(waiting)):
                 continue
@@ -232,6 +241,11 @@ class Slots:
             if not job.finished.is_set():
                 self.add(job)
         self.dispatch()
+
+
+def _place(render: Render) -> tuple[bool, int, int]:
+    """The place in its owner's line: what had begun goes on first, then the highest priority, then the oldest."""
+    return not render.began, -render.priority, render.place
 
 
 class Interruptible(Protocol):

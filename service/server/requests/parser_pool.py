@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import itertools
 import logging
 import pickle
 import signal
-import threading
-from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -23,10 +19,9 @@ from service.server.requests.parser_child import Failed, Work
 from service.server.requests.parsers import Kind, answer_classes
 from service.system.child_processes import Child, Children, Closed
 from service.system.garbage import collector_paused
-from service.system.shares import CALLER
+from service.system.turns import FairRoom
 
 BODIES = 1000  # for one child
-REMEMBERED = 1000  # callers whose last turn counts
 SECONDS_PER_BYTE = 0.25 / MIB  # twice what the slowest body there is was seen to take
 
 # What an answer is made of besides the models of documents: classes, and numpy's own functions for arrays.
@@ -46,7 +41,8 @@ class ParserPool:
     def __init__(self, config: Config) -> None:
         self._config = config.model_copy(update={"api_key": [], "callback_secret": []})  # not for strangers' texts
         self._children = Children("service.server.requests.parser_child", BODIES)
-        self._room = _Room(config.max_json_memory)
+        # No `Limit` of the `MemoryBudget`, which refuses at once and knows no order.
+        self._room = FairRoom(config.max_json_memory, each=config.max_json_memory)
 
     def parse(self, kind: Kind, body: bytearray, hold: Callable[[int], None] | None = None) -> Any:
         """Returns the result of PARSERS[kind], or raises; TooLarge where it takes too much memory or time.
@@ -76,52 +72,6 @@ class ParserPool:
     def close(self) -> None:
         """Ends the processes that wait; one that parses ends with its body."""
         self._children.close()
-
-
-class _Room:
-    """Bytes for bodies that are parsed at the same time: a thread that finds too few waits.
-
-    The next one is that of the caller that has fewest bytes, then of the one whose last turn is the longest ago, then
-    the one that has waited longest. Nobody overtakes it: small bodies would keep a large one waiting for ever. This
-    is no `Limit` of the `MemoryBudget`, which refuses at once and knows no order.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._left = size
-        self._changed = threading.Condition()
-        self._waiting: dict[object, str] = {}  # callers of the threads that wait, the first one first
-        self._taken: Counter[str] = Counter()  # bytes, by caller
-        self._turns = itertools.count()
-        self._last: dict[str, int] = {}  # the turn that each caller had last, the longest ago first
-
-    @contextmanager
-    def taken(self, size: int) -> Iterator[None]:
-        me, caller = object(), CALLER.get()
-        with self._changed:
-            self._waiting[me] = caller
-            self._changed.wait_for(lambda: self._next() is me and self._left >= size)
-            del self._waiting[me]
-            self._left -= size
-            self._taken[caller] += size
-            self._last.pop(caller, None)
-            self._last[caller] = next(self._turns)
-            if len(self._last) > REMEMBERED:
-                del self._last[next(iter(self._last))]
-            self._changed.notify_all()  # there may be room for the next one
-        try:
-            yield
-        finally:
-            with self._changed:
-                self._left += size
-                self._taken -= Counter({caller: size})  # which drops those that have none
-                self._changed.notify_all()
-
-    def _next(self) -> object:
-        def turn(waiting: object) -> tuple[int, int]:
-            caller = self._waiting[waiting]
-            return self._taken[caller], self._last.get(caller, -1)
-
-        return min(self._waiting, key=turn)
 
 
 def _ask(child: Child, work: Work) -> Any:

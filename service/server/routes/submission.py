@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 import time
-import weakref
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
@@ -27,6 +25,7 @@ from service.server.state import STARTING_S, AppState, app_state, caller_of, own
 from service.server.storage.asset_access import NO_USES, AllowedUses, Use
 from service.server.storage.quota import Quota
 from service.system.executors import opening, packing
+from service.system.turns import KeyedLocks
 
 ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an option in a shell
 
@@ -143,7 +142,7 @@ T = TypeVar("T")
 U = TypeVar("U")
 Find = Callable[[str, str], Awaitable[tuple[str, U] | None]]  # by owner and key: the digest, and what was made
 
-_turns: weakref.WeakValueDictionary[tuple[int, str, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
+_turns = KeyedLocks[tuple[int, str, str, str]]()
 
 
 def check_key(state: AppState, key: str | None) -> None:
@@ -171,7 +170,7 @@ async def once(
     for a request with another digest."""
     if key is None:
         return await make(None)
-    async with _turns.setdefault((id(state), kind, owner, key), asyncio.Lock()):
+    async with _turns.of((id(state), kind, owner, key)):
         found = await find(owner, key)
         if found is None:
             return await make(IdempotencyKey(key, digest))

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from service.ipc import channel
 from service.system.child_processes import signal_name
 from service.system.cpu import RunnableTime
+from service.system.turns import Turns
 from service.worker.helpers.process import HelperProcess
 
 if TYPE_CHECKING:
     from gpu import KernelKey
 
-REMEMBERED = 256  # clients whose last turn is known
 TRIES = 3  # processes that did not start, in a row; and processes that were killed at one kernel
 # A process is replaced after this many kernels, or where it holds more than this when it has compiled one: LLVM keeps
 # what it took.
@@ -64,8 +64,7 @@ class Lane:
     killed: dict[KernelKey, int] = field(default_factory=dict)  # how often the process was, at a kernel
     failures: int = 0  # in a row: processes that did not start, and kernels that the driver did not keep
     spent_s: float = 0.0  # of a processor, by all of its processes
-    begun: int = 0
-    served: dict[str, int] = field(default_factory=dict)  # by client: the number of its last kernel
+    turns: Turns = field(default_factory=Turns)  # of the clients
 
     @property
     def left_s(self) -> float | None:
@@ -91,14 +90,10 @@ class Lane:
                 del self.wanted[key]
 
     def choose(self) -> KernelKey:
-        """The next kernel: of the client that was served longest ago, or that came first."""
-        turns = {k: [self.served.get(client, 0) for client in callers.values()] for k, callers in self.wanted.items()}
-        served = {key: min(each, default=0) for key, each in turns.items()}
-        self.key = min(self.wanted, key=lambda key: served[key])
-        self.begun += 1
-        if len(self.served) > REMEMBERED:
-            self.served.clear()
-        self.served |= dict.fromkeys(self.wanted[self.key].values(), self.begun)
+        """The next kernel: of the client whose turn is the longest ago, or that came first."""
+        first = {key: min(map(self.turns.last, callers.values()), default=0) for key, callers in self.wanted.items()}
+        self.key = min(self.wanted, key=lambda key: first[key])
+        self.turns.had(*self.wanted[self.key].values())
         return self.key
 
     def begin(self) -> None:

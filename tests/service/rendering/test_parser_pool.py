@@ -29,6 +29,7 @@ from service.server.requests.parser_pool import ParserPool
 from service.server.requests.request_parser import RequestParser, unfolded
 from service.system.child_processes import Child
 from service.system.shares import CALLER
+from service.system.turns import FairRoom
 from tests.serving import SCENE, SMALL
 
 ROWS = [[0.5 * i, i % 7, -1e-3 * i] for i in range(3000)]
@@ -197,7 +198,7 @@ def test_memory_is_never_taken_for_less_than_it_is(text: str) -> None:
 
 def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
     """Small ones that always find room would keep a large one waiting for ever."""
-    room, order = parser_pool._Room(10), list[str]()
+    room, order = FairRoom(10, each=10), list[str]()
     large_waits = threading.Event()
 
     def take(name: str, size: int) -> None:
@@ -207,7 +208,7 @@ def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
     with room.taken(5):
         threads = [threading.Thread(target=take, args=("large", 10))]
         threads[0].start()
-        while not room._waiting:
+        while not len(room._waiting):
             large_waits.wait(0.001)
         threads.append(threading.Thread(target=take, args=("small", 1)))
         threads[1].start()
@@ -221,7 +222,7 @@ def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
 
 def test_room_goes_round_callers() -> None:
     """A second large body of one caller waits for the first one; another caller's does not wait for the second."""
-    room, order = parser_pool._Room(10), list[str]()
+    room, order = FairRoom(10, each=10), list[str]()
     pause = threading.Event()
 
     def take(name: str) -> None:
