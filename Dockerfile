@@ -5,9 +5,9 @@
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data sunbox
 #   docker run --rm --init --read-only --cap-drop ALL --security-opt no-new-privileges \
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
-# With Ray, for the nodes of a cluster (docs/scaling.md):
-#   docker build --build-arg LOCK=ray -t sunbox-ray .
-# With USD files: docker build --build-arg LOCK=usd -t sunbox-usd .
+# With any of these extras: usd (USD files), ray (the nodes of a cluster, docs/scaling.md), plot (figures of `sunbox bsdf`)
+# and ffmpeg (animations as .mp4):
+#   docker build --build-arg EXTRAS="usd ffmpeg" -t sunbox .
 # With the kernels of the processor that builds it, which take 2 min: docker build --build-arg WARM=1 -t sunbox .
 # Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22. By digest,
 # as a tag may become another image; Dependabot proposes the next one.
@@ -16,9 +16,18 @@ FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eeba
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
-COPY requirements.serve.lock requirements.ray.lock requirements.usd.lock requirements.build.lock ./
-ARG LOCK=serve
-RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r "requirements.${LOCK}.lock"
+COPY requirements.serve.lock requirements.ray.lock requirements.usd.lock requirements.plot.lock requirements.build.lock ./
+ARG EXTRAS=
+# All locks have the same version of what several of them need (a test).
+RUN set -- -r requirements.serve.lock; \
+    for extra in $EXTRAS; do \
+        case "$extra" in \
+            usd|ray|plot) set -- "$@" -r "requirements.$extra.lock" ;; \
+            ffmpeg|materialx) ;; \
+            *) echo "EXTRAS: there is no extra '$extra'; there are usd, ray, plot and ffmpeg" >&2; exit 1 ;; \
+        esac; \
+    done; \
+    /opt/sunbox/bin/pip install --require-hashes --only-binary :all: "$@"
 COPY pyproject.toml README.md ./
 COPY client client
 COPY gpu gpu
@@ -35,9 +44,11 @@ RUN python -m venv /opt/build \
 
 FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eebad5d583b45c2201c6e30a
 # Mesa's software renderer, and glvnd, which finds NVIDIA's driver when the container runtime brings one along.
+ARG EXTRAS=
 # hadolint ignore=DL3008
-RUN apt-get update \
-    && apt-get install -y --no-install-recommends libegl1 libopengl0 libgl1-mesa-dri \
+RUN case " $EXTRAS " in *" ffmpeg "*) more=ffmpeg ;; *) more= ;; esac \
+    && apt-get update \
+    && apt-get install -y --no-install-recommends libegl1 libopengl0 libgl1-mesa-dri $more \
     && rm -rf /var/lib/apt/lists/* \
     && mkdir -p /usr/share/glvnd/egl_vendor.d \
     && printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia.so.0"}}\n' \

@@ -115,7 +115,7 @@ class Config(BaseModel):
         None,
         description="Have the nodes of a Ray cluster render: the `HOST:PORT` of its head, or `auto`, which is Ray's "
         "own rule (`RAY_ADDRESS`, then a cluster that runs here, then a new one on this machine). Needs "
-        "`sunbox[ray]`.",
+        "`ray` of `sunbox-server`.",
     )
     ray_renderers: int | None = Field(
         None, ge=1, description="Renderers in the Ray cluster (default: one a GPU, without GPUs one a node)."

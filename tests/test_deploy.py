@@ -66,7 +66,7 @@ def test_a_profile_of_compose_is_a_cluster() -> None:
     (compose,) = documents(ROOT / "compose.yaml")
     head, worker = compose["services"]["head"], compose["services"]["worker"]
     assert head["profiles"] == worker["profiles"] == ["cluster"]
-    assert head["image"] == worker["image"] == "sunbox-ray" and head["build"]["args"] == {"LOCK": "ray"}
+    assert head["image"] == worker["image"] == "sunbox-ray" and head["build"]["args"] == {"EXTRAS": "ray"}
     assert head["environment"]["SUNBOX_RAY_RENDERERS"] == worker["deploy"]["replicas"]
     for service in (head, worker):
         assert service["environment"]["RAY_AUTH_MODE"] == "token" and service["read_only"]
@@ -123,22 +123,16 @@ def test_the_notebook_is_tested_with_what_is_locked() -> None:
     assert {name: everything.get(name, pin) for name, pin in notebook.items()} == notebook
 
 
-def test_usd_is_tested_with_what_is_locked() -> None:
-    """CI installs this lock, too, into the same environment; an image can be built from it."""
-    everything, usd, serve = (
-        dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
-        for name in ("requirements.lock", "requirements.usd.lock", "requirements.serve.lock")
+@pytest.mark.parametrize(("extra", "package"), [("usd", "usd-core"), ("ray", "ray"), ("plot", "matplotlib")])
+def test_an_image_with_extras_has_what_was_tested(extra: str, package: str) -> None:
+    """CI installs these locks into one environment, and so does an image: all have the same versions of what several
+    of them need."""
+    everything, lock, serve = (
+        dict(re.findall(r"^([A-Za-z0-9_.-]+)==(\S+)", (ROOT / f"requirements{name}.lock").read_text(), re.MULTILINE))
+        for name in ("", f".{extra}", ".serve")
     )
-    assert "usd-core" in usd and "usd-core" not in everything and serve.items() <= usd.items()
-    assert {name: everything.get(name, pin) for name, pin in usd.items()} == usd
-
-
-def test_the_image_with_ray_has_what_was_tested() -> None:
-    """CI installs both locks into one environment."""
-    pins = [
-        dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
-        for name in ("requirements.lock", "requirements.ray.lock", "requirements.serve.lock")
-    ]
-    everything, ray, serve = pins
-    assert "ray" in ray and "ray" not in everything and serve.items() <= ray.items()
-    assert {name: everything.get(name, pin) for name, pin in ray.items()} == ray
+    assert package in lock and package not in serve and serve.items() <= lock.items()
+    assert {name: everything.get(name, pin) for name, pin in lock.items()} == lock
+    dockerfile = (ROOT / "Dockerfile").read_text()
+    assert f"requirements.{extra}.lock" in dockerfile and re.search(rf"\b{extra}\b.*\) set -- ", dockerfile)
+    assert f"!requirements.{extra}.lock" in (ROOT / ".dockerignore").read_text()

@@ -40,6 +40,7 @@ def test_the_image_has_what_was_tested() -> None:
     client = tomllib.loads((ROOT / "client/pyproject.toml").read_text())["project"]
     wanted |= {re.split(r"[<>=\[; ]", text)[0].lower() for text in client["dependencies"]}
     assert wanted - {"sunbox"} <= serving.keys() and "pytest" not in serving
+    assert "materialx" in serving, "docs/files.md lists the format among what is read"
 
 
 def test_images_and_actions_are_pinned_by_their_content() -> None:

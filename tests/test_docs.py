@@ -29,9 +29,23 @@ def test_links_lead_to_files(page: Path) -> None:
 def test_every_shipped_package_is_in_the_notices() -> None:
     notices = (ROOT / "docs" / "notices.md").read_text()
     listed = {_normal(name) for name in re.findall(r"^\| ([\w.-]+) \| \w", notices, re.MULTILINE)}
-    for lock in ("requirements.serve.lock", "requirements.ray.lock", "requirements.usd.lock"):
+    for lock in (
+        "requirements.serve.lock",
+        "requirements.ray.lock",
+        "requirements.usd.lock",
+        "requirements.plot.lock",
+    ):
         locked = re.findall(r"^([a-z0-9][\w.-]*)==", (ROOT / lock).read_text(), re.MULTILINE)
         assert locked and {_normal(name) for name in locked} <= listed
+
+
+def test_nobody_is_told_to_install_a_name_that_no_index_has() -> None:
+    """Whoever registers it there runs programs on users' machines: pages and hints name a checkout or a wheel."""
+    files = [path for folder in ("docs", "service", "client", "web", "gpu") for path in (ROOT / folder).rglob("*.*")]
+    texts = [path for path in [ROOT / "README.md", *files] if path.suffix in (".md", ".py", ".js", ".html", ".ipynb")]
+    name = re.compile(r"pip3? install[^\n`]*?[ '\"](sunbox(-server)?(\[[\w,]+\])?)(?![\w./-])")
+    told = {f"{path.relative_to(ROOT)}: {found[0]}" for path in texts for found in name.finditer(path.read_text())}
+    assert told == {"docs/scaling.md: pip install sunbox"}, "which says what it would install"
 
 
 def _normal(name: str) -> str:

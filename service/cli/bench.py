@@ -78,7 +78,10 @@ def refuse_quick_publishing(arguments: argparse.Namespace) -> None:
 def need_matplotlib(option: str) -> None:
     """Raises BadInput where it is not installed."""
     if find_spec("matplotlib") is None:
-        raise BadInput(f"{option}: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+        raise BadInput(
+            f"{option}: needs matplotlib, which the extra `bench` brings: "
+            "pip install '.[bench]' in a checkout of Sunbox"
+        )
 
 
 def progress(line: str) -> None:

@@ -33,7 +33,10 @@ def run(arguments: argparse.Namespace) -> int:
     if format not in FORMATS:
         raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join(FORMATS)}")
     if format != ".csv" and find_spec("matplotlib") is None:
-        raise BadInput(f"-o {arguments.output!r}: needs matplotlib, which `pip install 'sunbox[plot]'` brings")
+        raise BadInput(
+            f"-o {arguments.output!r}: needs matplotlib, which the extra `plot` brings: "
+            "pip install '.[plot]' in a checkout of Sunbox"
+        )
     if arguments.lobes and arguments.kind != "polar":
         raise BadInput(f"--lobes: goes with --kind polar, not with {arguments.kind}")
     angles = list(dict.fromkeys(map(_angle, arguments.angle or [DEFAULT_ANGLE])))

@@ -244,11 +244,13 @@ READ_FORMATS = {
 
 
 def file_formats() -> dict[str, Any]:
+    """File formats that this server reads and writes; those whose package is not here are `missing` alone."""
+    read = {format: kind for format, kind in KINDS.items() if format not in missing()}
     return {
         "pictures": list(get_args(FileFormat)),
         "animations": list(animation.FORMATS),
-        **{name: [format for format, each in KINDS.items() if each == kind] for name, kind in READ_FORMATS.items()},
-        "materials": ["zip", "mtlx"],
+        **{name: [format for format, each in read.items() if each == kind] for name, kind in READ_FORMATS.items()},
+        "materials": [name for name in ("zip", "mtlx") if name not in missing()],
         "exports": [name for name, each in FORMATS.items() if each.has_scenes and each.is_provided],
         "compressions": list(COMPRESSIONS),
         "missing": missing(),

@@ -66,7 +66,7 @@ try:
 except ImportError as error:
     print(error)"""
     assert (
-        "sunbox[notebook]" in subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
+        "./client[notebook]" in subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
     )
 
 

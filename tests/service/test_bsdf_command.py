@@ -184,5 +184,5 @@ def test_figures_need_matplotlib(
 ) -> None:
     monkeypatch.setattr("service.cli.bsdf.find_spec", lambda name: None)
     assert main(["bsdf", write("m", GREY), "-o", str(tmp_path / "m.svg")]) == 2
-    assert "sunbox[plot]" in capsys.readouterr().err
+    assert "extra `plot`" in capsys.readouterr().err
     assert table(tmp_path, write("m", GREY))

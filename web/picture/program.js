@@ -21,7 +21,7 @@ function python(value, indent = "") {
 
 export function pythonProgram(scene, settings, { exposure, tone_map, lut }) {
   const given = Object.entries(settings).map(([name, value]) => `    ${name}=${python(value)},\n`);
-  return `# pip install sunbox; a key is read from SUNBOX_API_KEY
+  return `# pip install ./client in a checkout of Sunbox; a key is read from SUNBOX_API_KEY
 from sunbox import Client
 
 scene = ${python(scene)}

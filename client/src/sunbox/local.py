@@ -75,5 +75,6 @@ def _engine() -> Any:
         except ImportError as error:
             cause = error
     raise RuntimeError(
-        "sunbox.render needs the package sunbox-server (pip install 'sunbox[local]'); sunbox.Client does not."
+        "sunbox.render needs the package sunbox-server, which sunbox.Client does not: "
+        "pip install ./client . in a checkout of Sunbox."
     ) from cause

@@ -7,7 +7,10 @@ import sys
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-MISSING = "error: the tools for agents need the official SDK of the Model Context Protocol: pip install 'sunbox[mcp]'"
+MISSING = (
+    "error: the tools for agents need the official SDK of the Model Context Protocol: "
+    "pip install './client[mcp]' in a checkout of Sunbox"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -14,7 +14,9 @@ try:
     import anywidget
     import traitlets
 except ImportError:
-    raise ImportError("View needs anywidget, which an extra brings along: pip install 'sunbox[notebook]'") from None
+    raise ImportError(
+        "View needs anywidget, which an extra brings along: pip install './client[notebook]' in a checkout of Sunbox"
+    ) from None
 
 from sunbox.client import post, run
 from sunbox.errors import SunboxError

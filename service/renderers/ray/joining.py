@@ -14,7 +14,9 @@ from service.renderers.ray.control import Join, Joined
 from service.renderers.ray.renderers import plan, room
 
 ANSWER_S = 5.0  # for the head to accept a connection; Ray itself waits for two minutes
-INSTALL = "SUNBOX_RAY is set, and Ray is not installed here (extra sunbox[ray]): pip install 'ray>=2.60,<2.61'"
+INSTALL = (
+    "SUNBOX_RAY is set, and Ray is not installed here (extra `ray` of sunbox-server): pip install 'ray>=2.60,<2.61'"
+)
 
 
 log = logging.getLogger(__name__)
