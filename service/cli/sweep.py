@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +74,8 @@ def batch_file(
     settings = read_settings(arguments.set or [], config, source.settings).model_dump(mode="json", exclude_unset=True)
     with server_or_local(arguments.server) as client:
         scene = with_uploads(client, source, arguments.asset_root)
-        batch = client.batch(scene, over, **settings)
+        with typed(arguments, over):
+            batch = client.batch(scene, over, **settings)
         try:
             status = batch.wait()
             _refuse_failures(batch, status)
@@ -81,6 +83,35 @@ def batch_file(
         finally:
             if arguments.server is not None:
                 batch.delete()
+
+
+@contextmanager
+def typed(arguments: argparse.Namespace, over: list[dict[str, Any]]) -> Iterator[None]:
+    """A context that names what was typed in place of the request's members: `--over /path`, `--frames`, `--set`."""
+    from sunbox import Refused
+
+    def place(pointer: str) -> str:
+        first, _, rest = pointer.removeprefix("/").partition("/")
+        if first == "over" and rest:
+            number, _, member = rest.partition("/")
+            axis = over[int(number)]
+            if "path" not in axis:
+                return {"turntable": "--frames", "degrees": "--degrees"}.get(member, "--frames")
+            _, _, index = member.partition("/")
+            value = (
+                f"={json.dumps(axis['values'][int(index.partition('/')[0])])}" if member.startswith("values/") else ""
+            )
+            return f"--over {axis['path']}{value}"
+        if first == "settings" and rest:
+            return f"--set {rest}"
+        return f"{arguments.input}: /{rest}" if first == "scene" else "--over" if first == "over" else pointer or "/"
+
+    try:
+        yield
+    except Refused as error:
+        if not error.errors:
+            raise
+        raise BadInput(*(f"{place(pointer)}: {detail}" for pointer, detail in error.errors)) from None
 
 
 def _refuse_failures(batch: Batch, status: dict[str, Any]) -> None:

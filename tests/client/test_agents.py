@@ -218,7 +218,13 @@ def test_render_sheet(agent: Agent) -> None:
     found = result(answer)
     assert [each["value"] for each in found["pictures"]] == ["#c00000", "#00c000"]
     assert found["state"] == "done" and picture(answer).width > 64
-    assert pointers(agent.call("render_sheet", scene=SCENE, path="/materials/no/x", values=[1])) == ["/over/0/path"]
+    assert pointers(agent.call("render_sheet", scene=SCENE, path="/materials/no/x", values=[1])) == ["/path"]
+    assert pointers(agent.call("render_sheet", scene=SCENE, path="/materials/ball/roughness", values=[0.5, 7])) == [
+        "/values/1"
+    ]
+    assert pointers(agent.call("render_sheet", scene=SCENE, path=path, values=["#fff"], settings={"width": -1})) == [
+        "/settings/width"
+    ]
     assert agent.call("render_sheet", scene=SCENE, path=path, values=[1] * 37).is_error
 
 
@@ -321,4 +327,4 @@ def test_without_the_sdk_the_extra_is_named(tmp_path: Path) -> None:
     (tmp_path / "mcp" / "__init__.py").write_text("raise ImportError('not installed')")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run([sys.executable, "-m", "sunbox.mcp"], env=environment, capture_output=True, text=True)
-    assert done.returncode == 1 and "pip install 'sunbox[mcp]'" in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 1 and "pip install './client[mcp]'" in done.stderr and "Traceback" not in done.stderr

@@ -84,7 +84,8 @@ def test_a_killed_command_leaves_no_server_behind(scene: str, tmp_path: Path) ->
     [
         ("roughness=1", "s.png", "write it as /materials"),
         ("/materials/ball/roughness=1", "s.bmp", ".webp"),
-        ("/materials/ball/roughness=0.1,7", "s.png", "/over/0/values/1"),
+        ("/materials/ball/roughness=0.1,7", "s.png", "--over /materials/ball/roughness=7: "),
+        ("/materials/no/roughness=0.1", "s.png", "--over /materials/no/roughness: "),
     ],
 )
 def test_mistakes_of_a_sweep(
@@ -92,4 +93,15 @@ def test_mistakes_of_a_sweep(
 ) -> None:
     arguments = ["sweep", scene, "--over", over, "-o", str(tmp_path / output), "--server", server.url]
     assert main(arguments) == 2
-    assert said in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert said in error and "/over/" not in error
+
+
+def test_mistakes_of_a_turntable(
+    server: Server, scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["turntable", scene, "-o", str(tmp_path / "t.webp"), "--server", server.url]
+    for option, value in (("--frames", "0"), ("--degrees", "1e9")):
+        assert main([*arguments, option, value]) == 2
+        error = capsys.readouterr().err
+        assert f"{option}" in error and "/over/" not in error

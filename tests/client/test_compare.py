@@ -80,8 +80,9 @@ def test_the_example_of_the_readme(server: Server, tmp_path: Path, monkeypatch: 
 def test_pictures_on_both_sides(server: Server, exr: Path) -> None:
     with sunbox.Client(server.url) as client:
         job = client.submit(SCENE, **SETTINGS)
-        job.result()
-        for other in (job, job.id, client.upload(exr)):
+        picture = job.result()
+        assert picture.id == job.id
+        for other in (job, job.id, picture, client.upload(exr)):
             assert client.compare(exr, other).p_value == 1.0
         job.delete()
         with pytest.raises(sunbox.NotFound) as gone:

@@ -91,6 +91,12 @@ def test_many_may_open_an_old_folder_at_once(tmp_path: Path, caplog: pytest.LogC
     assert caplog.text.count("migrating the database") == VERSION
 
 
+def test_a_new_folder_is_not_migrated(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "service")
+    with Database(tmp_path).open():
+        assert "migrating" not in caplog.text and version(tmp_path) == VERSION
+
+
 def test_a_migration_that_fails_has_done_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with Database(tmp_path).open():
         before = tables(tmp_path)

@@ -269,6 +269,25 @@ def test_hosts_that_may_be_asked(server: str, hosts: list[str], host: str, statu
     assert statuses == [status]
 
 
+@pytest.mark.parametrize("path", ["/healthz", "/readyz", "/v1/info", "/"])
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+def test_a_balancer_may_ask_without_a_host(path: str, version: str) -> None:
+    """HAProxy's check is HTTP/1.0 and names none. Browsers always do, so this is no way to rebind a name."""
+    statuses: list[int] = []
+
+    async def send(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            statuses.append(message["status"])
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    guard = Guard(PlainTextResponse("here"), config=Config(), refuse=respond)
+    scope: Any = {"type": "http", "method": "GET", "path": path, "headers": [], "http_version": version}
+    asyncio.run(guard({**scope, "server": ("127.0.0.1", 8000)}, receive, send))
+    assert statuses == [200 if version == "1.0" and path in ("/healthz", "/readyz") else 403]
+
+
 def test_who_sends_a_refused_body_hears_why() -> None:
     """Answered at once; what still comes is taken before the connection is closed, which would lose the answer."""
     body: list[Any] = [{"type": "http.request", "body": b"x" * 9, "more_body": True}] * 3

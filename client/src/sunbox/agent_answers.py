@@ -149,6 +149,15 @@ def problems(error: SunboxError | Mistake) -> list[Problem]:
     return [Problem(pointer=pointer, detail=detail) for pointer, detail in error.errors]
 
 
+def in_arguments(error: SunboxError, place: str) -> SunboxError:
+    """The error with pointers into a tool's arguments: those below `place` of what the tool sent begin there."""
+    errors = [
+        (pointer.removeprefix(place) if f"{pointer}/".startswith(f"{place}/") else pointer, detail)
+        for pointer, detail in error.errors
+    ]
+    return type(error)(error.detail, error.status, errors, error.title)
+
+
 def shown(file: bytes) -> tuple[ImageContent, int, int]:
     """A PNG as a picture of at most a megapixel, its width and height. Transparent parts are black."""
     with Image.open(BytesIO(file)) as opened:

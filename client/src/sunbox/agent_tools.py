@@ -31,6 +31,7 @@ from sunbox.agent_answers import (
     SheetPicture,
     Validity,
     answered,
+    in_arguments,
     problems,
     refused,
     shown,
@@ -193,7 +194,10 @@ class AgentTools:
             refuse_files({path.rpartition("/")[2]: value}, f"/values/{place}")
         over = [{"path": path, "values": values}]
         body = {"scene": await self._scenes.document(scene), "settings": _with(SMALL, settings), "over": over}
-        status = await work(self.transport, "batches", body)
+        try:
+            status = await work(self.transport, "batches", body)
+        except SunboxError as error:
+            raise in_arguments(error, "/over/0") from None
         picture = None
         if status["counts"]["done"]:
             sheet = await AsyncBatch(self.transport, status["id"]).sheet()

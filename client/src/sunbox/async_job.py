@@ -111,6 +111,11 @@ class AsyncPicture:
         self._fetched: dict[tuple[str, tuple[tuple[str, Any], ...]], bytes] = {}
 
     @property
+    def id(self) -> str | None:
+        """The render on the server; None of a picture that this process rendered."""
+        return self._status.get("id")
+
+    @property
     def samples(self) -> int:
         return int(self._status["samples"])
 

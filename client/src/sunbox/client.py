@@ -108,7 +108,7 @@ class Client:
         return Stream(self._client.stream(scene, format, **settings))
 
     def compare(self, a: Any, b: Any, confidence: float = 0.999, map: str | None = None, **settings: Any) -> Verdict:
-        """A verdict on whether two scenes, renders or EXR files differ. Ctrl-C ends the work."""
+        """A verdict on whether two scenes, renders, pictures or EXR files differ. Ctrl-C ends the work."""
         return run(self._client.compare(a, b, confidence, map, **settings))
 
     def upload(self, file: str | Path | bytes, name: str = "") -> str:
@@ -272,6 +272,11 @@ class Picture:
 
     def __init__(self, picture: AsyncPicture) -> None:
         self._picture = picture
+
+    @property
+    def id(self) -> str | None:
+        """The render on the server; None of a picture that this process rendered."""
+        return self._picture.id
 
     @property
     def samples(self) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from sunbox import files
+from sunbox.async_job import AsyncPicture
 from sunbox.transport import Transport
 
 ID = re.compile(r"[0-9a-f]{32}|sha256:[0-9a-f]{64}")
@@ -65,6 +66,9 @@ async def _side(transport: Transport, side: Any, settings: dict[str, Any], point
     """A document with its settings, or the id of a picture."""
     if isinstance(id := getattr(side, "id", None), str):
         return id
+    picture = getattr(side, "_picture", side)  # of the blocking client
+    if isinstance(picture, AsyncPicture):  # this process rendered it
+        return await transport.upload(await picture.exr(), "picture.exr")
     if isinstance(side, str) and ID.fullmatch(side):
         return side
     if not isinstance(side, dict) and Path(side).suffix.lower() == ".exr":

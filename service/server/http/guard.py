@@ -40,6 +40,7 @@ CLOSE_CODES: dict[type[ServiceError], int] = {
     Unavailable: 4429,
 }  # of the stream
 HEALTH = "/healthz"  # always answered: an orchestrator restarts a server whose health check fails
+PROBES = (HEALTH, "/readyz")
 OPEN_OF_A_KEY = 128  # open requests of one key, long-polls, event streams and streams included
 REASON_CHARACTERS = 120  # a close frame has room for 123 bytes
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
@@ -127,6 +128,8 @@ class Guard:
 
         On an address that is not loopback every name is accepted unless SUNBOX_ALLOWED_HOSTS lists the right ones.
         """
+        if "host" not in headers and scope.get("http_version") == "1.0" and route_path(scope) in PROBES:
+            return  # a balancer's check, as HAProxy sends it; browsers always name the host
         host = _host(headers.get("host", ""))
         if (_is_loopback(scope) or self._config.allowed_hosts) and host not in self._hosts:
             raise Forbidden(f"Host {host!r} is not 127.0.0.1 or localhost, and SUNBOX_ALLOWED_HOSTS does not name it")

@@ -119,17 +119,21 @@ class Database:
             yield database
 
     def _migrate(self, database: sqlite3.Connection) -> None:
-        """Run each migration in one transaction, so that an interrupted one changes nothing."""
+        """Run each migration in one transaction, so that an interrupted one changes nothing; those of a new file in
+        one."""
         while (version := _version(database)) < VERSION:
             with database:
                 database.execute("BEGIN IMMEDIATE")
                 if _version(database) != version:  # another process was faster
                     continue
-                if version or database.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,):
-                    log.info("migrating the database", {"file": self.path, "to": version + 1})
-                for statement in MIGRATIONS[version].statements:
-                    database.execute(statement)
-                database.execute(f"PRAGMA user_version = {version + 1}")
+                is_new = version == 0 and database.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,)
+                reached = VERSION if is_new else version + 1
+                if not is_new:
+                    log.info("migrating the database", {"file": self.path, "to": reached})
+                for migration in MIGRATIONS[version:reached]:
+                    for statement in migration.statements:
+                        database.execute(statement)
+                database.execute(f"PRAGMA user_version = {reached}")
         if version > VERSION:
             raise DamagedFile(f"a newer version of Sunbox wrote the database: {self.path}")
 
