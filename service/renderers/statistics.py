@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Literal
 
+from service.system.shares import key_label
+
 Kind = Literal["stream", "render", "bsdf", "server"]  # whose work: a stream's, a render's, a lobe's, the server's own
 
 SECONDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
@@ -67,6 +69,7 @@ class Statistics(ClientStatistics):
     checkpoints: int = 0  # of renders, against such losses
     leases: Counter[str] = field(default_factory=Counter)  # it traced for other renderers: given, done, failed, wrong
     gpu_s: dict[Kind, float] = field(default_factory=lambda: defaultdict(float))
+    gpu_s_by_key: dict[str, float] = field(default_factory=lambda: defaultdict(float))  # by `key_label`
     gpu_s_of: dict[int, float] = field(default_factory=lambda: defaultdict(float))  # by task, while it is there
     samples: int = 0  # of pixels, traced
     compile_s: Distribution = field(default_factory=Distribution)  # kernels that were not in memory
@@ -74,3 +77,9 @@ class Statistics(ClientStatistics):
     setup_s: Distribution = field(default_factory=Distribution)  # uploading and compiling, a load
     load: RendererLoad = field(default_factory=RendererLoad)
     kernels_evicted: int = 0
+
+    def worked(self, kind: Kind, client: str, seconds: float) -> None:
+        """Count GPU time that a task of this kind and client has used."""
+        self.gpu_s[kind] += seconds
+        if key := key_label(client):
+            self.gpu_s_by_key[key] += seconds

@@ -59,7 +59,7 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
 
 
 def always(**fields: str) -> None:
-    """Add these fields to every line that the calling thread logs from now on."""
+    """Add these fields to every line that the calling thread or task logs from now on."""
     context_fields.set({**context_fields.get(), **fields})
 
 

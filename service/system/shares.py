@@ -4,6 +4,7 @@ whom the work at hand is for.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,10 +13,18 @@ from contextvars import ContextVar
 from service.problems import TooLarge, TooManyRequests, Unavailable
 
 RETRY_S = 5
+OWNER = re.compile(r"[0-9a-f]{16}")  # the name that a key's owner has (`server/http/guard.py`)
+KEY_LETTERS = 8
 
 # The name of the caller whose request is being worked on, "" for the service's own work. Tasks inherit it from the
 # request that started them, and threads from the task that gave them their work.
 CALLER: ContextVar[str] = ContextVar("CALLER", default="")
+
+
+def key_label(caller: str) -> str:
+    """The first letters of the hash of a caller's key, by which metrics and log lines name it; "" for a caller that
+    has no key, which may be an address."""
+    return caller[:KEY_LETTERS] if OWNER.fullmatch(caller) else ""
 
 
 class Shares:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import logging
 import os
@@ -54,6 +55,35 @@ def test_metrics_tell_what_happens(server: Server) -> None:
     assert now['sunbox_samples_total{renderer="0"}'] - before['sunbox_samples_total{renderer="0"}'] >= 2 * 8 * 32 * 24
     names = {re.split(r"[{ ]", name)[0] for name in now}
     assert {"sunbox_kernel_cache_hits_total", "sunbox_renders", "sunbox_gpu_bytes", "sunbox_info"} <= names
+
+
+def test_it_can_be_seen_which_key_uses_the_machine(tmp_path: Path) -> None:
+    """By the first letters of its hash, never by the key. It needs a server with keys, whose log is read."""
+    anna, bert = (hashlib.sha256(key).hexdigest()[:8] for key in (b"anna-key", b"bert-key"))
+    server = Server(tmp_path, SUNBOX_API_KEY="anna-key,bert-key", SUNBOX_LOG_FORMAT="json")
+    try:
+        server.wait()
+        body = {"scene": SCENE, "settings": SMALL}
+        with httpx.Client(base_url=server.url, timeout=300) as http:
+            answer = http.post("/v1/render", json=body, headers={"authorization": "Bearer anna-key"})
+            assert answer.status_code == 200
+            assert http.get("/v1/renders", headers={"authorization": "Bearer bert-key"}).status_code == 200
+            assert http.get("/v1/renders", headers={"authorization": "Bearer nobody"}).status_code == 401
+            name = f'sunbox_key_gpu_seconds_total{{key="{anna}",renderer="0"}}'
+            wait_until(lambda: name in http.get("/metrics").text)
+            text = http.get("/metrics").text
+        assert f'sunbox_key_requests_total{{key="{anna}"}} 1.0' in text
+        assert f'sunbox_key_requests_total{{key="{bert}"}} 1.0' in text
+        assert (
+            text.count("sunbox_key_requests_total{") == 2
+            and f'sunbox_key_gpu_seconds_total{{key="{bert}"' not in text
+        )
+    finally:
+        server.stop()
+    log = server.log.read_text()
+    lines = [json.loads(line) for line in log.splitlines() if '"answered"' in line]
+    assert {line.get("key") for line in lines if line["path"].startswith("/v1/")} == {anna, bert, None}
+    assert not any(key in log + text for key in ("anna-key", "bert-key"))
 
 
 def test_closing_the_connection_cancels(server: Server) -> None:

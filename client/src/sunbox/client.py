@@ -28,8 +28,7 @@ run, post = _background.run, _background.post
 
 
 class Client:
-    """The calls of `AsyncClient`, which has their documentation, without `await`. It may be used as a context
-    manager."""
+    """The calls of `AsyncClient`, which has their documentation, without `await`; a context manager, too."""
 
     def __init__(
         self,
@@ -275,17 +274,14 @@ class Picture:
 
     @property
     def id(self) -> str | None:
-        """The render on the server; None of a picture that this process rendered."""
         return self._picture.id
 
     @property
     def samples(self) -> int:
-        """Per pixel."""
         return self._picture.samples
 
     @property
     def noise(self) -> float | None:
-        """Estimated RMSE of the luminance over its mean; None before 2 samples."""
         return self._picture.noise
 
     @property
@@ -294,7 +290,6 @@ class Picture:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The resolved value of each knob."""
         return self._picture.settings
 
     @property

@@ -30,8 +30,8 @@ class Events(Protocol):
     def replayed(self, task: int) -> None:
         """A process that did not know this task has been sent all of it."""
 
-    def kind_of(self, task: int) -> Kind:
-        """The kind of another renderer's task, which this one assists."""
+    def work_of(self, task: int) -> tuple[Kind, str]:
+        """The kind and the client of another renderer's task, which this one assists."""
 
 
 class NoEvents:
@@ -49,5 +49,5 @@ class NoEvents:
 
     def replayed(self, task: int) -> None: ...
 
-    def kind_of(self, task: int) -> Kind:
-        return "server"
+    def work_of(self, task: int) -> tuple[Kind, str]:
+        return "server", ""

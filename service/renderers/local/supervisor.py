@@ -137,10 +137,7 @@ class Supervisor:
         return await self._keeper.ready(timeout_s)
 
     async def able(self, timeout_s: float) -> None:
-        """Returns when something renders, or did and is being replaced: work can be taken, which then waits a little.
-
-        Raises Unavailable.
-        """
+        """Returns when something renders, or did and is being replaced: work then waits. Raises Unavailable."""
         if not self.replaces:
             await self.ready(timeout_s)
 
@@ -373,9 +370,11 @@ class Supervisor:
         statistics.kernels_evicted += usage.evicted
         for number, seconds in usage.gpu_s.items():
             task = self.tasks.get(number)
-            if task is not None:
-                statistics.gpu_s_of[number] += seconds
-            statistics.gpu_s[self._events.kind_of(number) if task is None else task.kind] += seconds
+            if task is None:
+                statistics.worked(*self._events.work_of(number), seconds)
+                continue
+            statistics.gpu_s_of[number] += seconds
+            statistics.worked(task.kind, task.client, seconds)
 
     def _count(self, loaded: Loaded) -> None:
         self.statistics.setup_s.add(loaded.setup_s)

@@ -232,11 +232,11 @@ class Pool:
         self.homes.pop(task, None)
         self._division.dropped(task)
 
-    def _kind_of(self, task: int) -> Kind:
-        """The kind of a task that a renderer assists."""
+    def _work_of(self, task: int) -> tuple[Kind, str]:
+        """The kind and the client of a task that a renderer assists."""
         home = self.homes.get(task)
         task_record = None if home is None else home.tasks.get(task)
-        return "server" if task_record is None else task_record.kind
+        return ("server", "") if task_record is None else (task_record.kind, task_record.client)
 
 
 class _RendererEvents(Events):
@@ -263,8 +263,8 @@ class _RendererEvents(Events):
     def replayed(self, task: int) -> None:
         self._pool._division.replayed(task)
 
-    def kind_of(self, task: int) -> Kind:
-        return self._pool._kind_of(task)
+    def work_of(self, task: int) -> tuple[Kind, str]:
+        return self._pool._work_of(task)
 
 
 class _Peer:

@@ -29,7 +29,8 @@ from service.problems import (
     UnsupportedMedia,
 )
 from service.server.http.connection_limits import network_of
-from service.system.shares import CALLER, Shares
+from service.system.logs import always
+from service.system.shares import CALLER, Shares, key_label
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
@@ -100,6 +101,8 @@ class Guard:
                 scope["owner"] = self._owner(scope, headers)
                 scope["caller"] = scope["owner"] or network_of((scope.get("client") or ("",))[0])
                 CALLER.set(scope["caller"])
+                if scope["owner"]:
+                    always(key=key_label(scope["owner"]))
                 if route_path(scope) != HEALTH:
                     shares = self._of_keys if scope["owner"] else self._of_addresses
                     stack.enter_context(shares.taken(scope["caller"]))

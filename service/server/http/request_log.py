@@ -15,12 +15,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.problems import Internal, ServiceError
 from service.renderers.statistics import Distribution
 from service.system.logs import bound
+from service.system.shares import key_label
 
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
 ID_BYTES = 9
 ASKED_ALL_THE_TIME = ("/healthz", "/readyz", "/metrics")
 
-Heard = Callable[[str, str, int, float], None]  # method, route, status, seconds
+Heard = Callable[[str, str, int, float, str], None]  # method, route, status, seconds, the key's label
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +61,8 @@ class Requests:
 
     def _tell(self, scope: Scope, status: int, seconds: float) -> None:
         method = scope.get("method", "WEBSOCKET")
-        self._heard(method, getattr(scope.get("route"), "path", ""), status, seconds)
+        route = getattr(scope.get("route"), "path", "")
+        self._heard(method, route, status, seconds, key_label(scope.get("owner", "")))
         level = logging.DEBUG if scope["path"] in ASKED_ALL_THE_TIME else logging.INFO
         log.log(
             level,
@@ -83,10 +85,14 @@ class Traffic:
 
     def __init__(self) -> None:
         self.count: Counter[tuple[str, str, str]] = Counter()
+        self.by_key: Counter[str] = Counter()  # by the key's label; those of unknown keys are not counted
         self.seconds = Distribution()
 
-    def heard(self, method: str, route: str, status: int, seconds: float) -> None:
-        """Count a request. `route` is the address's pattern, "" for none: the number of addresses is unbounded."""
+    def heard(self, method: str, route: str, status: int, seconds: float, key: str = "") -> None:
+        """Count a request. `route` is the address's pattern, "" for none: the number of addresses is unbounded. `key`
+        is the label of its key, "" for none."""
+        if key:
+            self.by_key[key] += 1
         known = method if method in METHODS else "OTHER"
         self.count[known, route or "other", str(status)] += 1
         if known != "WEBSOCKET":

@@ -87,6 +87,8 @@ def _states(members: Sequence[Member]) -> Iterator[Metric]:
 def _requests(traffic: Traffic) -> Iterator[Metric]:
     labels = ("method", "route", "status")
     yield _counters("requests", "Requests, by method, route and status.", labels, traffic.count)
+    help = "Requests, by the first letters of the key's hash."
+    yield _counters("key_requests", help, ("key",), _by_one(traffic.by_key))
     yield _histogram("request_seconds", "From a request to its answer's end.", traffic.seconds)
 
 
@@ -97,7 +99,10 @@ def _work(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[Metr
     samples = _each(members, lambda seen: seen.samples)
     yield _counters("samples", "Samples of pixels that were traced.", ("renderer",), samples)
     used = _each_of(members, lambda seen: seen.gpu_s)
-    yield _counters("gpu_seconds", "GPU time, by whose work it was.", ("renderer", "client"), used)
+    yield _counters("gpu_seconds", "GPU time, by the kind of work.", ("renderer", "client"), used)
+    by_key = _each_of(members, lambda seen: seen.gpu_s_by_key)
+    help = "GPU time, by the first letters of the key's hash."
+    yield _counters("key_gpu_seconds", help, ("renderer", "key"), by_key)
 
 
 def _kernels(members: Sequence[Member]) -> Iterator[Metric]:
