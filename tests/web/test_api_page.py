@@ -1,10 +1,14 @@
-"""The tasks of docs/api.md in JavaScript, in a page of the server: no package and no node is needed for them."""
+"""The tasks of docs/api.md in JavaScript, in a page of the server and in Node, without any package."""
 
 from __future__ import annotations
 
+import json
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright._impl._driver import compute_driver_executable
 from playwright.sync_api import Page
 
 from tests.api_page import tasks
@@ -44,3 +48,17 @@ def test_task(page: Page, server: Server, number: int) -> None:
     assert shared != code[0]
     program = f"async () => {{ {shared}\n{{ {code[number]}\n return {RESULTS[number]}; }} }}"
     assert page.evaluate(program) == EXPECTED[number]
+
+
+def test_all_tasks_in_node(server: Server, tmp_path: Path) -> None:
+    """By the Node that Playwright brings along. There are no bitmaps: a picture's bytes are looked at."""
+    code = tasks("js")
+    parts = [code[0].replace("http://127.0.0.1:8000", server.url), "const told = {};"]
+    parts.append("const createImageBitmap = async (blob) => { const view = new DataView(await blob.arrayBuffer());")
+    parts.append('  return { width: blob.type === "image/png" ? view.getUint32(16) : null }; };')
+    parts += [f"{{ {code[number]}\n told[{number}] = {result}; }}" for number, result in RESULTS.items()]
+    (tmp_path / "tasks.mjs").write_text("\n".join([*parts, "process.stderr.write(JSON.stringify(told));"]))
+    node = compute_driver_executable()[0]
+    done = subprocess.run([node, tmp_path / "tasks.mjs"], capture_output=True, text=True)
+    told = {int(number): value for number, value in json.loads(done.stderr).items()}
+    assert told == EXPECTED | {2: ["image/jpeg", None]}, done.stderr
