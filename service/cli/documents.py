@@ -63,9 +63,9 @@ def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
     if is_model(path, data):
         return _model(path, data, roots, config)
     from service.document import load_json, parse_scene
-    from service.formats.images.metadata import EXR_MAGIC, PNG_MAGIC, read_metadata
+    from service.formats.images.metadata import EXR_MAGIC, PNG_MAGIC, is_webp, read_metadata
 
-    if data.startswith((PNG_MAGIC, EXR_MAGIC)):
+    if data.startswith((PNG_MAGIC, EXR_MAGIC)) or is_webp(data):
         from service.formats.images import recipe
 
         metadata = read_metadata(data)

@@ -1,5 +1,5 @@
 """`sunbox import MODEL -o SCENE.json`: a model as a document, its meshes and images in files beside it; likewise the
-materials of a zip or a folder of textures."""
+materials of a zip or a folder of textures, and the document of a picture that Sunbox made."""
 
 from __future__ import annotations
 
@@ -26,10 +26,13 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     from service.cli.models import import_model, is_model, zipped_images
     from service.document import presets, references
+    from service.formats.images.metadata import metadata_text
     from service.formats.types import Pose
     from service.server.assets import AssetStore, FileAssets
 
     data = zipped_images(source) if source.is_dir() else files.read(source)
+    if metadata_text(data) is not None:
+        return _picture(source, target)
     if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         raise BadInput(
             f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, USD, nor a zip, nor a folder of textures"
@@ -72,6 +75,17 @@ def run(arguments: argparse.Namespace) -> int:
 
         named = {ref: written(ref) for ref in references.references(document)}
         document = references.renamed(document, named.__getitem__)
+    files.write(target, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _picture(source: Path, target: Path) -> int:
+    """Write the document of a picture that Sunbox made. Files keep the names that they had."""
+    from service.cli.documents import read_source
+    from service.document import references
+
+    made = read_source(source, (), configuration())
+    document = references.renamed(made.document, lambda id: made.assets.get(id, id))
     files.write(target, (json.dumps(document, indent=1) + "\n").encode())
     return 0
 

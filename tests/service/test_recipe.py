@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sunbox
 from service.cli.program import main
 from service.document import references
-from service.formats.images import read_metadata, recipe
+from service.formats.images import FORMATS, encode, read_metadata, recipe
 from service.formats.images.metadata import png_with_text
 from service.problems import InvalidDocument
 from tests.serving import PATIENCE_S, SCENE, Server
@@ -93,6 +94,45 @@ def test_a_servers_picture_again(server: Server, tmp_path: Path, query: dict[str
     png = server.http.get(f"{address}/image", params=query).content
     (tmp_path / "a.png").write_bytes(png)
     assert render(tmp_path / "a.png", tmp_path / "b.png") == png
+
+
+WRITTEN = [name for name, each in FORMATS.items() if each.has_metadata]
+
+
+@pytest.mark.parametrize("is_long", [False, True])
+@pytest.mark.parametrize("format", WRITTEN)
+def test_a_picture_is_a_scene_in_all_four_ways(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format: str, is_long: bool
+) -> None:
+    """Over REST, by the client, by `sunbox import` and by `sunbox render`; `is_long`: the text is deflated."""
+    monkeypatch.setenv("SUNBOX_DATA_DIR", str(tmp_path / "data"))
+    name = 'a & b < "c" \'' + "é" * 5000 * is_long
+    document = {**SCENE, "materials": {**SCENE["materials"], name: {"type": "diffuse", "albedo": 0.25}}}
+    settings = {"width": 24, "height": 16, "max_samples": 2}
+    answer = server.http.post("/v1/render", json={"scene": document, "settings": settings}, params={"format": format})
+    assert answer.status_code == 200
+    path = tmp_path / f"a.{format}"
+    path.write_bytes(answer.content)
+    id = server.http.post("/v1/assets", content=answer.content, params={"filename": path.name}).json()["id"]
+    assert server.http.get(f"/v1/assets/{id}/scene").json() == document
+    with sunbox.Client(server.url) as client:
+        assert client.import_scene(path) == document
+    assert main(["import", str(path), "-o", str(tmp_path / "a.json")]) == 0
+    assert json.loads((tmp_path / "a.json").read_text()) == document
+    again = render(path, tmp_path / "again.png")
+    assert read_metadata(again)["scene"] == document  # type: ignore[index]
+
+
+def test_an_image_is_no_scene(server: Server) -> None:
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    id = server.http.post("/v1/assets", content=encode(pixels, "png")).json()["id"]
+    answer = server.http.get(f"/v1/assets/{id}/scene")
+    assert answer.status_code == 404 and "Sunbox did not make" in answer.json()["detail"]
+    made = {"sunbox": "1", "scene": {"version": 7}, "settings": {}, "samples": 1, "view": {}}
+    id = server.http.post("/v1/assets", content=encode(pixels, "webp", metadata=made)).json()["id"]
+    answer = server.http.get(f"/v1/assets/{id}/scene")
+    detail = answer.json()["detail"]
+    assert answer.status_code == 422 and "metadata" in detail and "/version" in detail
 
 
 def test_layers_of_a_servers_picture(server: Server, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Error, Page
 
+from service.formats import images
 from tests.web.modules import call
 
 PLACING = "document/placing.js"
@@ -197,3 +198,18 @@ def test_a_pose_keeps_what_was_done_by_hand(page: Page) -> None:
     turned = {"translate": [0, 1, 0], "rotate": [0, 90, 0]}
     assert made["shapes"][1] == {**scene[1], "transform": turned}
     assert [part["transform"]["translate"] for part in made["parts"]] == [[0, 1, 0], [1, 1, 0]]
+
+
+RECIPE = """async (pictures) => {
+    const { readRecipe } = await import("/document/recipe.js");
+    return Promise.all(pictures.map((bytes) => readRecipe(new File([Uint8Array.from(bytes)], "a"))));
+}"""
+
+
+@pytest.mark.parametrize("is_long", [False, True])
+def test_each_format_that_carries_a_recipe_is_read(page: Page, is_long: bool) -> None:
+    scene = {"a & \"b\" < 'c'": "é" * (5000 * is_long + 1)}
+    made = {"sunbox": "1", "scene": scene, "settings": {}, "samples": 1, "view": {}}
+    formats = [name for name, each in images.FORMATS.items() if each.has_metadata]
+    files = [images.encode(np.zeros((2, 2, 4), np.float32), format, metadata=made) for format in formats]
+    assert len(files) == 3 and page.evaluate(RECIPE, [list(data) for data in files]) == [made] * 3

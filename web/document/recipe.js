@@ -1,5 +1,5 @@
 // What a picture was made from, inside the picture: the same metadata that the server and the command line write into
-// PNG and EXR files, {sunbox, scene, settings, samples, view}, under the key "sunbox".
+// PNG, WebP and EXR files, {sunbox, scene, settings, samples, view}, under the key "sunbox".
 
 import { equal, isObject } from "../lib/patch.js";
 
@@ -68,6 +68,24 @@ async function pngText(bytes) {
   return null;
 }
 
+// Of the XMP packet: the text with XML's escapes, or deflated in base64.
+async function webpText(bytes) {
+  const view = new DataView(bytes.buffer);
+  for (let at = 12, size; at + 8 <= bytes.length; at += 8 + size + (size % 2)) {
+    size = view.getUint32(at + 4, true);
+    if (latin(bytes.subarray(at, at + 4)) !== "XMP ") continue;
+    const [, name, value] = latin(bytes.subarray(at + 8, at + 8 + size)).match(/ sunbox:(\w+)="([^"]*)"/) ?? [];
+    if (name === "recipe")
+      return ascii(new DOMParser().parseFromString(`<a>${value}</a>`, "text/xml").documentElement.textContent);
+    if (name === "deflated")
+      return through(
+        Uint8Array.from(atob(value), (each) => each.charCodeAt(0)),
+        new DecompressionStream("deflate"),
+      );
+  }
+  return null;
+}
+
 // Of the attributes of the first header: name, type, size, value.
 function exrText(bytes) {
   const view = new DataView(bytes.buffer);
@@ -90,13 +108,14 @@ export const givenOf = (values, base) =>
 
 const begins = (bytes, magic) => magic.every((byte, i) => bytes[i] === byte);
 
-// The recipe in a PNG or EXR, or null: any other file, and pictures that Sunbox did not make.
+// The recipe in a PNG, WebP or EXR, or null: any other file, and pictures that Sunbox did not make.
 export async function readRecipe(file) {
-  const magic = new Uint8Array(await file.slice(0, 8).arrayBuffer());
-  if (!begins(magic, PNG) && !begins(magic, EXR)) return null;
+  const magic = new Uint8Array(await file.slice(0, 12).arrayBuffer());
+  const isWebp = /^RIFF.{4}WEBP$/s.test(latin(magic));
+  if (!begins(magic, PNG) && !begins(magic, EXR) && !isWebp) return null;
   const bytes = new Uint8Array(await file.slice(0, MOST).arrayBuffer());
   try {
-    const text = begins(magic, PNG) ? await pngText(bytes) : exrText(bytes);
+    const text = begins(magic, PNG) ? await pngText(bytes) : isWebp ? await webpText(bytes) : exrText(bytes);
     const found = text && JSON.parse(new TextDecoder().decode(text));
     return isObject(found?.scene) && isObject(found.settings) ? found : null;
   } catch {

@@ -1,7 +1,7 @@
-"""Pixels -> PNG, JPEG, WebP, AVIF, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
+"""Pixels -> PNG, JPEG, WebP, AVIF, EXR, Radiance HDR and npy; PNG, WebP and EXR have the picture's recipe.
 
 encoders        how each format is written, with the colour space that it says
-metadata        the metadata of PNG and EXR files
+metadata        the metadata of PNG, WebP and EXR files
 recipe          the scene and settings that a picture was made from, in that metadata
 cryptomatte     which things cover how much of each pixel, as EXR files say it
 contact_sheet   many pictures on one, each with its name
@@ -71,7 +71,7 @@ class Format:
 FORMATS: dict[FileFormat | StreamFormat, Format] = {
     "png": Format("image/png", write_png, (8, 16), is_displayed=True, has_metadata=True),
     "jpeg": Format("image/jpeg", write_jpeg, (8,), is_displayed=True),
-    "webp": Format("image/webp", write_webp, (8,), is_displayed=True),
+    "webp": Format("image/webp", write_webp, (8,), is_displayed=True, has_metadata=True),
     "avif": Format("image/avif", write_avif, (8,), is_displayed=True),
     "exr": Format("image/x-exr", write_exr, (32,), is_displayed=False, has_metadata=True, by_openimageio=True),
     "hdr": Format("image/vnd.radiance", write_hdr, (32,), is_displayed=False, by_openimageio=True),

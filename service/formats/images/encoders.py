@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from service.displays import SRGB, Encoding
-from service.formats.images.metadata import KEY, png_with_encoding, png_with_text
+from service.formats.images.metadata import KEY, png_with_encoding, png_with_text, xmp
 
 QUALITY = 80
 FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
@@ -77,7 +77,8 @@ def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 
 def write_webp(file: BinaryIO, pixels: Array, choices: Choices) -> None:
     quality = QUALITY if choices.quality is None else choices.quality
-    file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2, **choices.profile))
+    made_from = {} if choices.metadata is None else {"xmp": xmp(_text(choices.metadata))}
+    file.write(_pillow(_bytes(pixels), "WEBP", quality=quality, method=2, **made_from, **choices.profile))
 
 
 def write_avif(file: BinaryIO, pixels: Array, choices: Choices) -> None:

@@ -1,6 +1,9 @@
-"""The metadata of PNG and EXR files, read from the bytes alone: no library opens the file."""
+"""The metadata of PNG, WebP and EXR files, read from the bytes alone: no library opens the file."""
 
+import base64
+import html
 import json
+import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -14,16 +17,25 @@ TEXT_BYTES = 256 << 20  # most bytes of one inflated text chunk: a few kilobytes
 
 
 def read_metadata(data: bytes) -> dict[str, Any] | None:
-    """The JSON object that Sunbox wrote into a PNG or EXR; None without one. The caller validates it."""
-    if data.startswith(PNG_MAGIC):
-        text = next((text for key, text in _png_texts(data) if key == KEY.encode()), None)
-    else:
-        text = exr_attributes(data).get(KEY)
+    """The JSON object that Sunbox wrote into a PNG, WebP or EXR; None without one. The caller validates it."""
+    text = metadata_text(data)
     try:
         found = json.loads(text) if text is not None else None
     except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
+
+
+def metadata_text(data: bytes) -> bytes | None:
+    """The text of that object; None without one."""
+    if data.startswith(PNG_MAGIC):
+        return next((text for key, text in _png_texts(data) if key == KEY.encode()), None)
+    return _webp_text(data) if is_webp(data) else exr_attributes(data).get(KEY)
+
+
+def is_webp(data: bytes) -> bool:
+    """True for the bytes of a WebP."""
+    return data[:4] == b"RIFF" and data[8:12] == b"WEBP"
 
 
 def exr_attributes(data: bytes) -> dict[str, bytes]:
@@ -70,6 +82,32 @@ def png_with_encoding(png: bytes, codes: tuple[int, int] | None, profile: bytes 
             parts.append(png[at : at + 12 + size])
         at += 12 + size
     return b"".join(parts)
+
+
+def xmp(text: str) -> bytes:
+    """An XMP packet with a text, for a WebP; deflated where it is long. The text must be ASCII."""
+    name, value = "recipe", html.escape(text)
+    if len(text) > LONG_TEXT:
+        name, value = "deflated", base64.b64encode(zlib.compress(text.encode("ascii"))).decode()
+    return (
+        '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">'
+        f'<rdf:Description rdf:about="" xmlns:{KEY}="urn:{KEY}:recipe" {KEY}:{name}="{value}"/></rdf:RDF></x:xmpmeta>'
+    ).encode("ascii")
+
+
+def _webp_text(data: bytes) -> bytes | None:
+    at = 12
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from("<4sI", data, at)
+        if kind == b"XMP " and (found := _XMP.search(data, at + 8, at + 8 + size)) is not None:
+            if found[1] == b"recipe":
+                return html.unescape(found[2].decode("utf-8", "replace")).encode()
+            return _inflated(base64.b64decode(found[2] + b"==="))
+        at += 8 + size + size % 2
+    return None
+
+
+_XMP = re.compile(rb'\bsunbox:(recipe|deflated)="([^"]*)"')
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""The recipe in PNG and EXR files: scene, settings and view, enough to make the same picture again."""
+"""The recipe in PNG, WebP and EXR files: scene, settings and view, enough to make the same picture again."""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ from service.document.base import Model
 from service.document.material import MODELS
 from service.document.material.conversion import Converted, Document, converted, parameters
 from service.document.validation import among, validated
-from service.problems import FieldError, InvalidDocument, escaped
+from service.formats.images import recipe
+from service.problems import AssetError, FieldError, InvalidDocument, escaped
 from service.server.requests.batch_request import parse_batch
 from service.server.requests.bsdf_request import BsdfRequest, parse_albedo, parse_terms, parse_values
 from service.server.requests.compare_request import parse_compare
@@ -26,7 +27,7 @@ from service.server.storage.documents import CheckedDocument, checked
 Body = bytearray | memoryview
 Kind = Literal[
     "render", "keyed_render", "batch", "request", "scene", "scenes", "materials", "bsdf", "albedo", "terms",
-    "conversion", "comparison", "export",
+    "conversion", "comparison", "export", "recipe",
 ]  # fmt: skip
 
 
@@ -48,6 +49,13 @@ def _scene(config: Config, body: Body) -> Scene:
 
 def _saved_scene(config: Config, body: Body) -> CheckedDocument:
     return checked("scenes", load_json(body), config)
+
+
+def _recipe(config: Config, body: Body) -> CheckedDocument:
+    try:
+        return checked("scenes", recipe.read(load_json(body)).scene, config)
+    except InvalidDocument as error:
+        raise AssetError(f"the scene in the picture's metadata: {error}") from None
 
 
 def _saved_material(config: Config, body: Body) -> CheckedDocument:
@@ -86,6 +94,7 @@ PARSERS: dict[Kind, Callable[[Config, Body], Any]] = {
     "conversion": _conversion,
     "comparison": parse_compare,
     "export": parse_export,
+    "recipe": _recipe,
 }
 
 

@@ -17,8 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.document import presets
 from service.document.text import dump_json
 from service.formats import AssetInfo
+from service.formats.images.metadata import metadata_text
 from service.formats.types import Kind, Pose
-from service.problems import FieldError, InvalidDocument, UnsupportedMedia
+from service.problems import FieldError, InvalidDocument, NotFound, UnsupportedMedia
 from service.server.assets.posing import described, posed_scene
 from service.server.http.downloads import FileAnswer
 from service.server.requests.bodies import SMALL
@@ -27,6 +28,7 @@ from service.server.routes.answers import Responses, reference
 from service.server.routes.examples import UPLOADED
 from service.server.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
+from service.system.memory import Holder
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -151,7 +153,8 @@ class PoseQuery(BaseModel):
 
 @router.get(
     "/{id}/scene",
-    summary="A glTF file, a zipped OBJ or a mesh as a scene document with a camera that shows it",
+    summary="A glTF file, a zipped OBJ or a mesh as a scene document with a camera that shows it; of a picture that "
+    "Sunbox made the scene in its metadata",
     response_class=JSONResponse,
     responses=answers.SCENE_DOCUMENT | answers.problems(404, 422),
 )
@@ -164,8 +167,24 @@ async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuer
 
     storage, owner, pose = app_state(request).storage, owner_of(request), query.pose()
 
-    def read() -> Response:
+    def made_from() -> bytes | None:
         storage.access.check(owner, id)
+        if storage.assets.info(id).kind != "image":
+            return None
+        if (text := metadata_text(storage.assets.read(id))) is None:
+            raise NotFound(f"{id[:100]} is an image that Sunbox did not make: it has no scene in its metadata")
+        return text
+
+    if (text := await opening(made_from, caller_of(request))) is not None:
+        state, values = app_state(request), Holder()
+        try:
+            hold = partial(state.memory.hold, "bodies", values)
+            found = await state.bodies.parsed("recipe", bytearray(text), caller_of(request), hold)
+            return Response(found.body, media_type=JSON)
+        finally:
+            state.memory.release(values)
+
+    def read() -> Response:
         imported = posed_scene(storage.assets, id, pose, partial(storage.shares.room, owner))
         storage.shares.imported(owner, id, imported.references())
         headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
@@ -194,8 +213,24 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
 
     storage, owner = app_state(request).storage, owner_of(request)
 
-    def read() -> Response:
+    def made_from() -> bytes | None:
         storage.access.check(owner, id)
+        if storage.assets.info(id).kind != "image":
+            return None
+        if (text := metadata_text(storage.assets.read(id))) is None:
+            raise NotFound(f"{id[:100]} is an image that Sunbox did not make: it has no scene in its metadata")
+        return text
+
+    if (text := await opening(made_from, caller_of(request))) is not None:
+        state, values = app_state(request), Holder()
+        try:
+            hold = partial(state.memory.hold, "bodies", values)
+            found = await state.bodies.parsed("recipe", bytearray(text), caller_of(request), hold)
+            return Response(found.body, media_type=JSON)
+        finally:
+            state.memory.release(values)
+
+    def read() -> Response:
         imported = storage.assets.materials(id)
         storage.shares.imported(owner, id, imported.references())
         document = imported.document
