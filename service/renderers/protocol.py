@@ -69,6 +69,10 @@ class Renderers(Protocol):
     def hopeless(self) -> bool:
         """True if all attempts to start any renderer failed, so that the next one is some time away."""
 
+    @property
+    def waiting(self) -> str:
+        """The reasons why there is no place for any renderer; "" where one of them renders, or starts."""
+
     def start(self) -> None:
         """Start the processes, where that has not been done; they are ready some tenths of a second later."""
 

@@ -94,9 +94,12 @@ class AppState:
         self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients, self.config.max_key_clients)
 
     async def info(self) -> dict[str, Any]:
-        """The answer of GET /v1/info. Waits for a renderer that is being started; null where there is none."""
+        """The answer of GET /v1/info. Waits for a renderer that is being started; null where there is none. One that
+        has no place yet, as no node has joined its cluster, may never start, and is not waited for."""
         try:
-            renderer: dict[str, Any] | None = await self.renderers.ready(STARTING_S)
+            renderer: dict[str, Any] | None = await self.renderers.ready(
+                0.0 if self.renderers.waiting else STARTING_S
+            )
         except Unavailable:
             renderer = None
         return {

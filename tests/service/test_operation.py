@@ -20,9 +20,11 @@ import pytest
 import uvicorn
 
 from service.config import GIB, MAX_PIXELS, MIB, Config
+from service.problems import Unavailable
+from service.renderers.pool.pool import Pool
 from service.server import app, launch
 from service.server.routes.metrics import scrape
-from service.server.state import AppState
+from service.server.state import STARTING_S, AppState
 from service.system import logs
 from tests.calls import metrics
 from tests.serving import ENDLESS, KEYS, SCENE, SMALL, Server, client, wait_until
@@ -84,6 +86,25 @@ def test_it_can_be_seen_which_key_uses_the_machine(tmp_path: Path) -> None:
     lines = [json.loads(line) for line in log.splitlines() if '"answered"' in line]
     assert {line.get("key") for line in lines if line["path"].startswith("/v1/")} == {anna, bert, None}
     assert not any(key in log + text for key in ("anna-key", "bert-key"))
+
+
+@pytest.mark.parametrize("place", ["", "no node has joined"])
+def test_info_does_not_wait_for_a_node_that_may_never_join(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    waited = list[float]()
+
+    class Renderers(Pool):
+        waiting = place
+
+        async def ready(self, timeout_s: float) -> dict[str, Any]:
+            waited.append(timeout_s)
+            raise Unavailable(place)
+
+    monkeypatch.setattr("service.server.app.Pool", lambda *_: Renderers([]))
+    state: AppState = app.create_app(Config(data_dir=tmp_path)).state.sunbox
+    assert asyncio.run(state.info())["renderer"] is None
+    assert waited == [0.0 if place else STARTING_S]
 
 
 def test_closing_the_connection_cancels(server: Server) -> None:

@@ -180,7 +180,7 @@ class AsyncClient:
     async def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> lobes.Bsdf:
         """A material's BSDF for each of n directions `wo`, (n, 3), and m directions `wi`, (m, 3), in the shading
         frame: z is the normal, x the tangent. Any number of them: more than a request takes go in several."""
-        out, into = lobes.directions(wo), lobes.directions(wi)
+        out, into = lobes.directions(wo, "/wo"), lobes.directions(wi, "/wi")
         f, pdf = np.empty((len(out), len(into), 3)), np.empty((len(out), len(into)))
         delta: list[list[lobes.SpecularLobe]] = [[] for _ in out]
         for rows, columns in lobes.tiles(out, into):

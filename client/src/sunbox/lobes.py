@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sunbox.errors import Refused
+
 PAIRS = 65_536  # directions times directions that a server evaluates in one request
 FLOATS = NDArray[np.float64]
 
@@ -40,11 +42,12 @@ class Albedo:
     error: FLOATS
 
 
-def directions(given: ArrayLike) -> FLOATS:
-    """(n, 3), of one direction or rows of them. Raises ValueError."""
+def directions(given: ArrayLike, pointer: str) -> FLOATS:
+    """(n, 3), of one direction or rows of them. Raises Refused with the pointer."""
     rows = np.atleast_2d(np.asarray(given, np.float64))
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
-        raise ValueError(f"directions are rows of x, y, z: shape (n, 3), not {np.shape(given)}")
+        detail = f"directions are rows of x, y, z: shape (n, 3), not {np.shape(given)}"
+        raise Refused(detail, errors=[(pointer, detail)])
     return rows
 
 
