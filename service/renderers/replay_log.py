@@ -1,10 +1,11 @@
-"""The messages of a task that a new renderer needs in order to go on with it."""
+"""A task as the server has it, and the messages that a new renderer needs in order to go on with it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 from service.ipc import channel
 from service.ipc.channel import Encoded
@@ -27,7 +28,8 @@ from service.ipc.messages import (
     Want,
 )
 from service.ipc.task_control import ApplyNow, Pause, Resume, Stop
-from service.renderers.working_states import WorkingStates
+from service.renderers.protocol import Listener
+from service.renderers.statistics import Kind
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
 StoredPicture = Restore | Callable[[], Restore]
@@ -195,3 +197,65 @@ class ReplayLog:
             self.saved = Restore(done.task, done.generation, done.saved, done.reason, done.progress)
             self._stopped_at = None
         return done
+
+
+MOST = 4  # states; while a renderer compiles for one, dragging a slider makes hundreds
+
+State = TypeVar("State")
+
+
+class WorkingStates(Generic[State]):
+    """States by the generations with which they began, in order."""
+
+    def __init__(self, discard: Callable[[State], None] = lambda state: None) -> None:
+        """`discard` is called with each state that is forgotten."""
+        self._states: list[tuple[int, State]] = []
+        self._discard = discard
+
+    def items(self) -> Iterator[tuple[int, State]]:
+        """The generations and the states, the oldest first."""
+        yield from self._states
+
+    @property
+    def newest(self) -> State | None:
+        return self._states[-1][1] if self._states else None
+
+    def at(self, generation: int) -> State | None:
+        """The state that began with this generation, unless it was forgotten."""
+        return next((state for began, state in self._states if began == generation), None)
+
+    def push(self, generation: int, state: State) -> None:
+        """Add a newer state. Of more than MOST, the first after the one that works is forgotten."""
+        self._states.append((generation, state))
+        if len(self._states) > MOST:
+            self._forget(1)
+
+    def works(self, generation: int) -> None:
+        """The renderer was seen to work at this generation: it goes back to no state before that."""
+        while len(self._states) > 1 and self._states[1][0] <= generation:
+            self._forget(0)
+
+    def keep(self, wanted: Callable[[int], bool] = lambda generation: False) -> None:
+        """Forget all states but those that began with a wanted generation."""
+        for at in reversed(range(len(self._states))):
+            if not wanted(self._states[at][0]):
+                self._forget(at)
+
+    def _forget(self, at: int) -> None:
+        self._discard(self._states.pop(at)[1])
+
+
+@dataclass
+class Task:
+    listener: Listener
+    kind: Kind
+    client: str
+    record: ReplayLog
+    resident: bool = True  # the renderer has it, or is being told
+    strikes: int = 0  # renderers that it brought down
+    struck_at: float = 0.0
+
+    @property
+    def active(self) -> bool:
+        """True if it takes a renderer's time, as an attended stream does, and a render until it has ended."""
+        return self.record.saved is None and not self.record.away

@@ -22,7 +22,7 @@ from service.formats.formats import COMPRESSIONS, KINDS, missing
 from service.formats.images import animation
 from service.pack import Packed
 from service.problems import Unavailable
-from service.renderers.bsdf_questions import BsdfQuestions
+from service.renderers.ask import BsdfQuestions
 from service.renderers.protocol import Member, Renderers
 from service.server.batches.batch import Batch, Members
 from service.server.batches.queue import BatchQueue

@@ -34,14 +34,11 @@ from service.ipc.messages import (
 )
 from service.ipc.task_control import Drop
 from service.problems import MISTAKE, Unavailable
-from service.renderers.local.events import Events, NoEvents
-from service.renderers.local.keeper import CLOSING, Keeper
+from service.renderers.local.keeper import BY_OTHERS, CLOSING, Keeper
 from service.renderers.local.process import Cause, Options, Process, RendererProcess, Start
-from service.renderers.local.restarts import BY_OTHERS
-from service.renderers.protocol import Listener, Member, Place
-from service.renderers.replay_log import ReplayLog
+from service.renderers.protocol import Events, Listener, Member, NoEvents, Place
+from service.renderers.replay_log import ReplayLog, Task
 from service.renderers.statistics import Kind, RendererLoad, Statistics
-from service.renderers.task import Task
 from service.system.background import reported
 from service.system.executors import sending, tending
 

@@ -14,12 +14,11 @@ from service.ipc.channel import Encoded
 from service.ipc.leases import Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.ipc.messages import Heard, Restore, SavedPicture, ToRenderer, Update
 from service.problems import Unavailable
-from service.renderers.local.events import Events
 from service.renderers.local.keeper import STARTING
 from service.renderers.local.process import Options, Start
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.pool.division import Division
-from service.renderers.protocol import Listener, Member, Place
+from service.renderers.protocol import Events, Listener, Member, Place
 from service.renderers.statistics import ClientStatistics, Kind
 
 DRIVERS_S = 15.0  # how long a stored picture waits for renderers to start, one of which may be its own

@@ -7,7 +7,6 @@ between hosts is up to Ray.
 
 cluster     the server's side: joins a cluster through the gateway, and starts renderers there
 pool        a pool of renderers that are all actors of one cluster
-process     one renderer of the cluster as its supervisor sees it
 control     what the server and the gateway say to each other beside the renderers' own messages
 gateway     the process that speaks to Ray
 joining     how the gateway joins a cluster, or says why it can't
@@ -15,5 +14,4 @@ renderers   how many renderers a cluster is asked for, and what is declared to R
 lane        one renderer in the gateway: carries messages between its supervisor's socket and its actor
 carriage    how one message travels through Ray: small ones together, large ones by the object store
 actor       the actor, which runs the renderer's process on its node
-code        which code a node runs: other code would give other bits, or not understand a message
 """

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import os
 import socket
 from collections import deque
 from dataclasses import replace
+from functools import cache
+from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from service.config import cores
@@ -14,10 +18,36 @@ from service.ipc import channel
 from service.ipc.messages import FromRenderer, Ready, SceneData, ToRenderer, Update
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.devices import listed, of_cuda
-from service.renderers.ray.code import version
 from service.renderers.ray.control import ProcessEnded
 from service.system.background import Background, reported, within
 from service.system.memory import MemoryBudget
+
+ROOT = Path(__file__).parents[3]
+# All that decides about a picture's bits and about what messages mean.
+FOLDERS = ("gpu", "shaders", "service/ipc", "service/renderers", "service/worker")
+SUFFIXES = {".py", ".glsl", ".comp"}
+
+
+@cache
+def version() -> str:
+    """The version of Sunbox with a digest of its code: a checkout keeps its version while its code changes."""
+    digest = hashlib.sha256()
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in SUFFIXES:
+                digest.update(f"{path.relative_to(ROOT)}\0".encode() + path.read_bytes() + b"\0")
+    return f"{metadata.version('sunbox')}+{digest.hexdigest()[:12]}"
+
+
+def difference(host: str, there: str) -> str | None:
+    """The error about a node with another version than this process has; None where they are the same."""
+    if there == version():
+        return None
+    return (
+        f"SUNBOX_RAY: host {host} has Sunbox {there}, and this server has {version()}. "
+        "Install the same Sunbox on all nodes of the Ray cluster, and restart Ray there."
+    )
+
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 WATCH_S = 0.5

@@ -18,8 +18,8 @@ from service.ipc.server_end import Channel
 from service.ipc.task_control import Drop, TakeCheckpoint
 from service.problems import MISTAKE
 from service.renderers.local.process import NoPlace
+from service.renderers.ray.actor import difference
 from service.renderers.ray.carriage import LARGE, Scenes, size, stored
-from service.renderers.ray.code import difference
 from service.renderers.ray.control import ProcessEnded
 from service.system.background import Background
 

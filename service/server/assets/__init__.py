@@ -1,7 +1,6 @@
 """Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path.
 
 store         uploaded assets
-rendered      uploaded pictures that Sunbox rendered, with what their noise is
 folder        the files of the store, each written whole or not at all, and the disk space of all
 integrity     whether the bytes on the disk still match their hash
 local_files   assets that are files beside a scene

@@ -1,7 +1,6 @@
 """Renders asked for over REST.
 
 render      one render: its states, its task with a renderer, and its end
-states      the states, and where its picture may be
 queue       all renders, with bounds on how many wait, run and are kept
 slots       which renders run, which wait, and which give way to others
 viewer      shows the picture of a render, from its task or from the disk
@@ -11,6 +10,6 @@ retention   which ended renders make room, and which stay with the renderer
 recorder    writes what becomes of a render to the store
 followers   who follows renders, and learns of their changes
 listing     lists of renders, a page at a time
-status      the status of a render, as callers see it
+status      the states of a render, and its status as callers see it
 store       renders on the disk
 """

@@ -32,8 +32,17 @@ from service.renderers.protocol import Listener, Renderers
 from service.server.renders.followers import Changes
 from service.server.renders.recorder import Recorder, Writing
 from service.server.renders.scene import Load, PackedScenes, RenderScene
-from service.server.renders.states import Ended, Loading, PictureAt, Queued, RenderState, Tracing, monotonic
-from service.server.renders.status import error_of, status
+from service.server.renders.status import (
+    Ended,
+    Loading,
+    PictureAt,
+    Queued,
+    RenderState,
+    Tracing,
+    error_of,
+    monotonic,
+    status,
+)
 from service.server.renders.store.record import ENDED, End, Order, Outcome, State
 from service.server.renders.viewer import ASK_AGAIN_S, KeepsPictures, PictureViewer
 from service.server.requests.request_parser import patched

@@ -16,7 +16,7 @@ from typing import Generic, Protocol, TypeVar
 from service.problems import Gone, ServiceError
 from service.server.renders.recorder import Recorder
 from service.server.renders.render import InBatch, Render
-from service.server.renders.states import PictureAt, monotonic
+from service.server.renders.status import PictureAt, monotonic
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.rows import EndedMember
 from service.server.renders.store.store import RenderStore

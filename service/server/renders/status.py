@@ -1,15 +1,18 @@
-"""The status and the errors of a render, as callers see them."""
+"""The states of a render, and its status and its errors as callers see them."""
 
 from __future__ import annotations
 
+import time
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import Flag
 from typing import Any
 
 from service.document.quality import forecast
 from service.ipc.leases import undivided
 from service.ipc.messages import Failed
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
-from service.server.renders.store.record import Order, Outcome
+from service.server.renders.store.record import End, Order, Outcome
 
 
 def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False) -> dict[str, Any]:
@@ -50,3 +53,40 @@ def iso(seconds: float | None) -> str | None:
 
 def error_of(failed: Failed) -> ServiceError:
     return InvalidDocument([FieldError("/scene", failed.detail)]) if failed.refused else Internal(failed.detail)
+
+
+@dataclass(frozen=True)
+class Queued:
+    """It waits for a slot, for memory, for the disk or for a renderer."""
+
+
+@dataclass(frozen=True)
+class Loading:
+    """It has a slot; its scene is read, and sent to a renderer, which compiles its kernel."""
+
+
+@dataclass(frozen=True)
+class Tracing:
+    """A renderer adds samples, or did and is being replaced."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    how: End
+
+
+RenderState = Queued | Loading | Tracing | Ended
+
+
+class PictureAt(Flag):
+    """Where the newest samples of a render are."""
+
+    NOWHERE = 0
+    RENDERER = 1
+    DISK = 2
+    BOTH = 3
+
+
+def monotonic(ended_at: float | None) -> float:
+    """A time since 1970, by default now, by the monotonic clock."""
+    return time.monotonic() - max(0.0, time.time() - (ended_at or time.time()))

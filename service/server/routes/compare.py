@@ -15,10 +15,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.document.quality import ResolvedSettings
 from service.formats import images
+from service.formats.cache import refused
+from service.formats.errors import ParseError
+from service.formats.source import for_sandbox
+from service.formats.types import RenderedPicture
 from service.ipc.messages import ESTIMATE
 from service.pack import Packed
 from service.problems import AssetError, FieldError, InvalidDocument, NotFound, Unavailable
-from service.server.assets.rendered import rendered
+from service.server.assets.store import AssetStore
 from service.server.renders.render import Render
 from service.server.requests import compare_request
 from service.server.requests.compare_request import ParsedComparison, check_pixels, check_sizes
@@ -211,3 +215,14 @@ async def _estimate(job: Render) -> Estimate:
 def _denoised() -> InvalidDocument:
     detail = "was denoised, so that its noise is not known: render it without `denoise`"
     return InvalidDocument([FieldError("", detail)])
+
+
+def rendered(assets: AssetStore, id: str) -> RenderedPicture:
+    """Colour, variance and samples of an EXR file. Raises NotFound, AssetError."""
+    if assets.info(id).format != "exr":
+        raise AssetError("is no EXR file")
+    try:
+        with assets.opened(id) as source:
+            return assets.loader.sandbox.parse_rendered(for_sandbox(source))
+    except ParseError as error:
+        raise refused("the EXR file", error) from None

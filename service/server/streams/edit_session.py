@@ -15,7 +15,7 @@ from service.document.text import weigh
 from service.ipc.messages import Lut, Update
 from service.pack import PackCache, parameter_edit, scene_edit
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, TooLarge
-from service.renderers.working_states import WorkingStates
+from service.renderers.replay_log import WorkingStates
 from service.server.renders.scene import COPIES, picture_bytes
 from service.server.requests.request_reader import RequestReader, stop_rule
 from service.server.streams import protocol

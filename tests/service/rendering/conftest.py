@@ -10,7 +10,7 @@ import pytest
 
 from gpu import Renderer
 from service.config import cores
-from service.renderers.local import restarts
+from service.renderers.local import keeper
 from service.renderers.local.supervisor import Supervisor
 from tests.serving import PATIENCE_S, Server, wait_until
 from tests.supervisors import Rendering, renderer_options
@@ -19,8 +19,8 @@ from tests.supervisors import Rendering, renderer_options
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A renderer that ends is started again at once, and given up soon."""
-    monkeypatch.setattr(restarts, "BETWEEN_TRIES_S", 0.0)
-    monkeypatch.setattr(restarts, "HOPELESS_S", 0.05)
+    monkeypatch.setattr(keeper, "BETWEEN_TRIES_S", 0.0)
+    monkeypatch.setattr(keeper, "HOPELESS_S", 0.05)
 
 
 @pytest.fixture(scope="session")

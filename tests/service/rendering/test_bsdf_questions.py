@@ -19,7 +19,7 @@ from service.document.material.openpbr import OpenpbrMaterial
 from service.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
 from service.pack import pack, pack_material
 from service.problems import TooManyRequests
-from service.renderers.bsdf_questions import LONG_AT_ONCE, MOST, BsdfQuestions
+from service.renderers.ask import LONG_AT_ONCE, MOST, BsdfQuestions
 from service.renderers.local.supervisor import Supervisor
 from tests.documents import Shelf
 from tests.serving import SCENE

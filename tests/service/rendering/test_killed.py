@@ -14,7 +14,7 @@ from gpu import SceneEdit
 from service.config import NICENESS
 from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.problems import Unavailable
-from service.renderers.local import restarts
+from service.renderers.local import keeper
 from service.renderers.local.supervisor import Supervisor
 from service.renderers.statistics import RendererLoad
 from tests.service.rendering.fakes import FakeProcesses, until, with_fake_processes
@@ -45,7 +45,7 @@ def niceness(pid: int | None) -> set[int]:
 
 def test_who_kills_it_before_it_can_start_never_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     """More than ten times the three that may fail by themselves: whoever has work there keeps it."""
-    monkeypatch.setattr(restarts, "AFTER_KILLS_S", 0.0)
+    monkeypatch.setattr(keeper, "AFTER_KILLS_S", 0.0)
     processes = FakeProcesses(cause="killed")
 
     async def test(supervisor: Supervisor) -> None:
@@ -83,11 +83,11 @@ def test_a_task_that_always_brings_it_down_is_lost_alone() -> None:
 
 
 def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time() -> None:
-    killed = restarts.Restarts()
+    killed = keeper.Restarts()
     killed.shots = 3
     assert killed.pause_s(0.1) == pytest.approx(1.4) and killed.pause_s(2.0) == 0.0
     killed.shots = 1000
-    assert killed.pause_s(0.0) == restarts.AFTER_KILLS_S and killed.pause_s(8.0) == 0.0
+    assert killed.pause_s(0.0) == keeper.AFTER_KILLS_S and killed.pause_s(8.0) == 0.0
 
 
 def test_what_was_asked_while_there_was_none_is_answered(rendering: Rendering) -> None:

@@ -30,7 +30,7 @@ from service.server.renders import render, slots, viewer
 from service.server.renders.queue import RenderQueue
 from service.server.renders.recorder import Recorder
 from service.server.renders.render import Render
-from service.server.renders.states import Ended, PictureAt, Tracing
+from service.server.renders.status import Ended, PictureAt, Tracing
 from service.server.renders.store import rows
 from service.server.renders.store.record import Order, Outcome
 from service.server.renders.store.store import RenderStore

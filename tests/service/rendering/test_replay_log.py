@@ -10,8 +10,7 @@ import pytest
 from service.ipc import channel
 from service.ipc.messages import Failed, Loaded, StopRule, Update
 from service.ipc.task_control import ApplyNow
-from service.renderers.replay_log import ReplayLog
-from service.renderers.working_states import MOST
+from service.renderers.replay_log import MOST, ReplayLog
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from service.config import Config
 from service.formats import Assets
 from service.pack import CacheBudget, PackCache
 from service.problems import InvalidDocument, TooLarge, TooManyRequests
-from service.renderers import working_states
+from service.renderers import replay_log
 from service.renderers.local.supervisor import Supervisor
 from service.server.requests.request_reader import RequestReader
 from service.server.streams import protocol
@@ -98,7 +98,7 @@ def test_versions_that_nobody_has_seen_are_not_all_kept() -> None:
         say(client, generation, scene={"camera": {"vfov": generation}})
         client.pack_pending()
     kept = [generation for generation, _ in client._states.items()]
-    assert len(kept) == working_states.MOST and kept[0] == 1 and kept[-1] == 49
+    assert len(kept) == replay_log.MOST and kept[0] == 1 and kept[-1] == 49
     assert client.failed(49, 1) is None and client.version is not None and client.version.generation == 1
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.renderers.working_states import MOST, WorkingStates
+from service.renderers.replay_log import MOST, WorkingStates
 
 
 def pushed(*generations: int) -> tuple[WorkingStates[str], list[str]]:

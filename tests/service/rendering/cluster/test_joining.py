@@ -20,7 +20,7 @@ from service.ipc import channel
 from service.ipc.messages import Unable, Update
 from service.ipc.server_end import Channel
 from service.renderers.local.process import NoPlace
-from service.renderers.ray import carriage, code, lane
+from service.renderers.ray import actor, carriage, lane
 from service.renderers.ray.carriage import Scenes, digest
 from service.renderers.ray.cluster import Cluster
 from service.renderers.ray.control import ProcessEnded
@@ -179,7 +179,7 @@ async def told(actors: Actors, count: int) -> list[Any]:
 def test_a_node_with_other_code_is_told_apart() -> None:
     unable, ended = asyncio.run(told(Actors({"host": "far", "version": "0.0.9+abc"}), 2))
     assert isinstance(unable, Unable) and ended == ProcessEnded("crashed")
-    for word in ("SUNBOX_RAY", "host far", "0.0.9+abc", code.version()):
+    for word in ("SUNBOX_RAY", "host far", "0.0.9+abc", actor.version()):
         assert word in unable.detail
 
 
@@ -196,14 +196,14 @@ def test_a_node_without_sunbox() -> None:
 
 
 def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    here = code.version()
-    assert code.difference("near", here) is None
+    here = actor.version()
+    assert actor.difference("near", here) is None
     (tmp_path / "shaders").mkdir()
     versions = set()
     for text in ("one", "other"):
         (tmp_path / "shaders" / "a.glsl").write_text(text)
-        monkeypatch.setattr(code, "ROOT", tmp_path)
-        versions.add(code.version.__wrapped__())
+        monkeypatch.setattr(actor, "ROOT", tmp_path)
+        versions.add(actor.version.__wrapped__())
     assert len(versions | {here}) == 3
 
 
