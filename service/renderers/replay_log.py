@@ -246,7 +246,7 @@ class WorkingStates(Generic[State]):
 
 
 @dataclass
-class Task:
+class TaskRecord:
     listener: Listener
     kind: Kind
     client: str

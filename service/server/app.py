@@ -25,8 +25,8 @@ from starlette.responses import FileResponse, Response
 from service.config import Config
 from service.document import presets
 from service.problems import Unavailable
-from service.renderers.pool.devices import seats
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.devices import renderer_specs
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.ray.joining import CannotJoin
 from service.renderers.ray.pool import cluster_pool
 from service.server.http.compression import Compressed
@@ -76,7 +76,7 @@ FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX
 log = logging.getLogger(__name__)
 
 
-def create_app(config: Config, places: Sequence[Seat] = ()) -> FastAPI:
+def create_app(config: Config, places: Sequence[RendererSpec] = ()) -> FastAPI:
     """The service as an ASGI application. The renderers' processes start with its lifespan, if they were not started
     before on these `places`, and end with it."""
     stored = storage(config, lambda: store.pictures)
@@ -86,7 +86,7 @@ def create_app(config: Config, places: Sequence[Seat] = ()) -> FastAPI:
         config,
         stored,
         RequestReader(config, stored.assets, memory, stored.access),
-        Pool(places or seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
+        RendererPool(places or renderer_specs(config, memory.limit)) if config.ray is None else cluster_pool(config),
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(
@@ -127,7 +127,7 @@ def create_app(config: Config, places: Sequence[Seat] = ()) -> FastAPI:
     return app
 
 
-def serve(config: Config, listener: socket.socket, most: int, places: Sequence[Seat] = ()) -> int:
+def serve(config: Config, listener: socket.socket, most: int, places: Sequence[RendererSpec] = ()) -> int:
     """Print the address and serve until SIGINT or SIGTERM, with at most `most` connections; `places` as for
     `create_app`. Returns the exit code: 1 where it could not start."""
     host, port = listener.getsockname()[:2]

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 from service.config import Config, cores, unknown_variables
 from service.renderers.local.process import EarlyStart
-from service.renderers.pool.devices import missing_device, seats
-from service.renderers.pool.pool import Seat
+from service.renderers.pool.devices import missing_device, renderer_specs
+from service.renderers.pool.pool import RendererSpec
 from service.server.storage.data_lock import FolderInUse, locked
 from service.system.confined import hide
 from service.system.cpu import set_steps
@@ -71,10 +71,10 @@ def run(config: Config) -> int:
 
 
 @contextmanager
-def _started(config: Config) -> Iterator[list[Seat]]:
-    """The renderers' seats, on which their processes start; none where they are on other machines."""
+def _started(config: Config) -> Iterator[list[RendererSpec]]:
+    """The specifications of the renderers, whose processes start now; none where they are on other machines."""
     with ExitStack() as stack:
-        places = [] if config.ray is not None else seats(config, MemoryBudget(config.memory).limit)
+        places = [] if config.ray is not None else renderer_specs(config, MemoryBudget(config.memory).limit)
         options = (replace(place.options, name=place.place.id) for place in places)
         starts = [stack.enter_context(closing(EarlyStart(each))) for each in options]
         yield [replace(place, start=start) for place, start in zip(places, starts, strict=True)]

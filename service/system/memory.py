@@ -88,7 +88,7 @@ def takes(part: str, size: int) -> None:
         found.takes(part, size)
 
 
-class Holder:
+class Reservation:
     """An object that bytes can be counted for where nothing else has just their lifetime."""
 
 
@@ -164,7 +164,7 @@ class MemoryBudget:
     @contextmanager
     def growing(self, category: Category | Limit) -> Iterator[Callable[[int], None]]:
         """A context in which as many bytes count as its function was last called with; the function is `hold`."""
-        holder = Holder()
+        holder = Reservation()
         try:
             yield lambda size: self.hold(category, holder, size)
         finally:

@@ -22,7 +22,7 @@ from service.document.quality import resolve
 from service.document.settings import Settings
 from service.formats.images import LAYERS
 from service.ipc.messages import Progress, View
-from service.renderers.pool.pool import Pool
+from service.renderers.pool.pool import RendererPool
 from service.server.app import create_app
 from service.server.batches.batch import Batch, member_id
 from service.server.http.guard import Keys
@@ -80,7 +80,7 @@ ADDRESSES: dict[str, list[str]] = {
 }
 
 
-class Renderers(Pool):
+class Renderers(RendererPool):
     """Renders nothing, and says that it could."""
 
     def __init__(self) -> None:
@@ -105,7 +105,7 @@ async def ready(readiness: Readiness) -> None: ...
 def test_no_answer_holds_the_event_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PictureViewer, "image", black)
     monkeypatch.setattr(Readiness, "check", ready)
-    monkeypatch.setattr("service.server.app.Pool", lambda *_: Renderers())
+    monkeypatch.setattr("service.server.app.RendererPool", lambda *_: Renderers())
 
     async def run() -> None:
         app = create_app(Config(data_dir=tmp_path, api_key=["a"]))

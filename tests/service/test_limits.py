@@ -42,7 +42,6 @@ CODE = {
     "server/app.py to_thread": OWN,
     "formats/sandbox/sandbox.py self.children = Children": "one for each turn",
     "formats/sandbox/sandbox.py self._room = FairRoom": "all but one for one caller, the one with fewest first",
-    "server/app.py state = Pool": "renderers, whose time is divided among clients by the scheduler",
     "server/callbacks/queue.py AT_ONCE": SHARES,
     "server/callbacks/queue.py shares = Shares": SHARES,
     "server/callbacks/queue.py OF_ONE_HOST": "of a host; turns go round owners",

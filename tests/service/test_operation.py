@@ -21,7 +21,7 @@ import uvicorn
 
 from service.config import GIB, MAX_PIXELS, MIB, Config
 from service.problems import Unavailable
-from service.renderers.pool.pool import Pool
+from service.renderers.pool.pool import RendererPool
 from service.server import app, launch
 from service.server.routes.metrics import scrape
 from service.server.state import STARTING_S, AppState
@@ -94,14 +94,14 @@ def test_info_does_not_wait_for_a_node_that_may_never_join(
 ) -> None:
     waited = list[float]()
 
-    class Renderers(Pool):
+    class Renderers(RendererPool):
         waiting = place
 
         async def ready(self, timeout_s: float) -> dict[str, Any]:
             waited.append(timeout_s)
             raise Unavailable(place)
 
-    monkeypatch.setattr("service.server.app.Pool", lambda *_: Renderers([]))
+    monkeypatch.setattr("service.server.app.RendererPool", lambda *_: Renderers([]))
     state: AppState = app.create_app(Config(data_dir=tmp_path)).state.sunbox
     assert asyncio.run(state.info())["renderer"] is None
     assert waited == [0.0 if place else STARTING_S]

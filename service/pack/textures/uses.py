@@ -66,7 +66,7 @@ class TextureReference:
         return Texels.NORMALS if self.suffix == NORMALS else Texels.SRGB if self.srgb else Texels.LINEAR
 
     @property
-    def look(self) -> tuple[str, bool]:
+    def sample_key(self) -> tuple[str, bool]:
         """A key that is equal where one sample of the texture serves both references."""
         return self.reference.texture + self.suffix, self.srgb
 

@@ -64,7 +64,7 @@ def _slots(uses: list[TextureReference]) -> dict[str, int]:
     """Member -> slot. Members share a slot where no material reads two textures by them."""
     looks: dict[str, dict[int, tuple[str, bool]]] = {}
     for use in uses:
-        looks.setdefault(use.member, {})[use.material] = use.look
+        looks.setdefault(use.member, {})[use.material] = use.sample_key
     surface = [name for name in (*texture_records.SURFACE_RANGES, *texture_records.NORMALS) if name in looks]
     slots: dict[str, int] = {}
     by_slot: list[dict[int, tuple[str, bool]]] = []

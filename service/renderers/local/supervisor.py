@@ -37,7 +37,7 @@ from service.problems import MISTAKE, Unavailable
 from service.renderers.local.keeper import BY_OTHERS, CLOSING, Keeper
 from service.renderers.local.process import Cause, Options, Process, RendererProcess, Start
 from service.renderers.protocol import Events, Listener, Member, NoEvents, Place
-from service.renderers.replay_log import ReplayLog, Task
+from service.renderers.replay_log import ReplayLog, TaskRecord
 from service.renderers.statistics import Kind, RendererLoad, Statistics
 from service.system.background import reported
 from service.system.executors import sending, tending
@@ -64,7 +64,7 @@ class Supervisor:
         self.place = place or Place()
         options = replace(options or Options(), name=self.place.id)
         self._numbers = numbers or itertools.count(1)
-        self.tasks: dict[int, Task] = {}  # those that were opened here, or taken over, by their numbers
+        self.tasks: dict[int, TaskRecord] = {}  # those that were opened here, or taken over, by their numbers
         self._events = events or NoEvents()
         self._keeper = Keeper(
             self.place.id, start or partial(Process, options), options.patience_s, self.statistics, self
@@ -146,16 +146,16 @@ class Supervisor:
         if not self.takes_tasks:
             raise Unavailable(self.detail)
         number = next(self._numbers)
-        self.tasks[number] = Task(listener, kind, client or str(number), ReplayLog(number))
+        self.tasks[number] = TaskRecord(listener, kind, client or str(number), ReplayLog(number))
         return number
 
-    def take_over(self, number: int, task: Task) -> None:
+    def take_over(self, number: int, task: TaskRecord) -> None:
         """Go on with a task that was opened elsewhere, as with one's own after a loss of the process."""
         self.tasks[number] = task
         if self._keeper.process is not None:
             self._begin_again(number, task)
 
-    def give_up(self, number: int) -> Task:
+    def give_up(self, number: int) -> TaskRecord:
         """A task, for another supervisor to take over; this one's renderer forgets it."""
         task = self.tasks[number]
         self._remove(number)
@@ -235,12 +235,12 @@ class Supervisor:
 
     # What becomes of its tasks.
 
-    def _remove(self, number: int) -> Task | None:
+    def _remove(self, number: int) -> TaskRecord | None:
         """The task, which is not here from now on; None where it was not."""
         self.statistics.gpu_s_of.pop(number, None)
         return self.tasks.pop(number, None)
 
-    def _forget(self, number: int) -> Task | None:
+    def _forget(self, number: int) -> TaskRecord | None:
         """The task, of which nothing stays; None where it is not here."""
         if (task := self._remove(number)) is not None:
             task.record.close()
@@ -254,13 +254,13 @@ class Supervisor:
         for task in tasks.values():
             task.listener.lost(detail)
 
-    def _bring_back_soon(self, number: int, task: Task) -> None:
+    def _bring_back_soon(self, number: int, task: TaskRecord) -> None:
         """Begin to bring back a picture; where that fails, what was under way begins again."""
         self._keeper.do(
             "return of a picture", self._bring_back(number, task), partial(self._lose_picture, number, task)
         )
 
-    async def _bring_back(self, number: int, task: Task) -> None:
+    async def _bring_back(self, number: int, task: TaskRecord) -> None:
         """Send the process a picture that it does not have, to go on with it or to read it."""
         process, stored_picture = self._keeper.process, task.record.stored_picture
         try:
@@ -297,7 +297,7 @@ class Supervisor:
     def given_up(self) -> None:
         self._fail_all(self._keeper.detail)
 
-    def _begin_again(self, number: int, task: Task) -> None:
+    def _begin_again(self, number: int, task: TaskRecord) -> None:
         """Send a process that does not know the task all that it needs."""
         task.resident = task.record.stored_picture is None
         if task.resident:
@@ -314,7 +314,7 @@ class Supervisor:
                 self._keeper.send(message)
         self._events.replayed(number)
 
-    def _lose_picture(self, number: int, task: Task, error: Exception) -> None:
+    def _lose_picture(self, number: int, task: TaskRecord, error: Exception) -> None:
         """The server's copy of a picture cannot be read: what was under way begins again."""
         log.error("could not read a picture that was stored", {"task": number, "error": error})
         if task.resident or number not in self.tasks:
@@ -334,7 +334,7 @@ class Supervisor:
             self._keeper.send(Drop(number))
             task.listener.lost(MISTAKE)
 
-    def _hear(self, message: Heard, task: Task) -> None:
+    def _hear(self, message: Heard, task: TaskRecord) -> None:
         if isinstance(message, Evicted):
             return self._evicted(message.task, task)
         if isinstance(message, Done) and task.record.saved is not None:
@@ -352,7 +352,7 @@ class Supervisor:
         task.listener.heard(message)
         self._events.heard(message)
 
-    def _evicted(self, number: int, task: Task) -> None:
+    def _evicted(self, number: int, task: TaskRecord) -> None:
         task.resident = task.record.saved is None
         if task.resident:  # it ended before it had a sample
             for read in list(task.record.reads.values()):

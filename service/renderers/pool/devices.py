@@ -10,7 +10,7 @@ from typing import Any
 
 from service.config import Config, cores
 from service.renderers.local.process import ROOT, Options
-from service.renderers.pool.pool import Seat
+from service.renderers.pool.pool import RendererSpec
 from service.renderers.protocol import Place
 from service.system.child_processes import inherited_environment
 
@@ -19,8 +19,8 @@ LISTING_S = 60.0  # for a driver that wakes a GPU up, on a busy machine
 GPUS_ONLY = "SUNBOX_DEVICES asks for renderers on the processor, and SUNBOX_REQUIRE_GPU forbids these; {there}"
 
 
-def seats(config: Config, host_memory: int) -> list[Seat]:
-    """A seat for each renderer. `host_memory`: bytes of the machine's memory that all together may hold."""
+def renderer_specs(config: Config, host_memory: int) -> list[RendererSpec]:
+    """How and where each renderer runs. `host_memory`: bytes of the machine's memory that all together may hold."""
     options = Options(
         config.device,
         patience_s=config.hang_s,
@@ -34,13 +34,15 @@ def seats(config: Config, host_memory: int) -> list[Seat]:
         memory = None if config.gpu_memory is None else config.gpu_memory // count
         options = replace(options, software=True, memory=memory)
         shares = [max(1, cores() // count + (i < cores() % count)) for i in range(count)]
-        return [Seat(Place(str(i), "llvmpipe"), replace(options, cores=share)) for i, share in enumerate(shares)]
+        return [
+            RendererSpec(Place(str(i), "llvmpipe"), replace(options, cores=share)) for i, share in enumerate(shares)
+        ]
     if config.devices:
         return [
-            Seat(Place(str(i), device), replace(options, device=int(device)))
+            RendererSpec(Place(str(i), device), replace(options, device=int(device)))
             for i, device in enumerate(config.devices)
         ]
-    return [Seat(Place("0", str(config.device or 0)), options)]
+    return [RendererSpec(Place("0", str(config.device or 0)), options)]
 
 
 def missing_device(config: Config) -> str | None:

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Seat:
+class RendererSpec:
     """Where a renderer of the pool runs, and how its process is started: one of this machine by default."""
 
     place: Place = field(default_factory=Place)
@@ -36,20 +36,20 @@ class Seat:
     start: Start | None = None
 
 
-class Pool:
-    """Fulfils `Renderers` with a supervisor for each seat.
+class RendererPool:
+    """Fulfils `Renderers` with a supervisor for each of them.
 
     A stream or a render stays with its renderer for life, through the losses of the process too. Where there is no
     hope for that one, its tasks move to others; it is tried again all the time, and gets new tasks when it is back.
     Questions, which take less time than a process takes to start, move at once.
     """
 
-    def __init__(self, seats: Sequence[Seat]) -> None:
+    def __init__(self, specs: Sequence[RendererSpec]) -> None:
         self.statistics = ClientStatistics()
         numbers = itertools.count(1)
         self.supervisors = [
-            Supervisor(seat.options, seat.start, seat.place, numbers, _RendererEvents(self, number))
-            for number, seat in enumerate(seats)
+            Supervisor(spec.options, spec.start, spec.place, numbers, _RendererEvents(self, number))
+            for number, spec in enumerate(specs)
         ]
         self.homes: dict[int, Supervisor] = {}  # which of them works on it, by open task
         self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
@@ -241,7 +241,7 @@ class Pool:
 class _RendererEvents(Events):
     """The pool's answers to the events of one of its renderers."""
 
-    def __init__(self, pool: Pool, number: int) -> None:
+    def __init__(self, pool: RendererPool, number: int) -> None:
         self._pool, self._number = pool, number
 
     def changed(self) -> None:

@@ -7,7 +7,7 @@ import time
 
 from service.config import Config
 from service.renderers.local.process import Options
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.protocol import Place
 from service.renderers.ray.cluster import Cluster
 from service.system.background import Background, reported
@@ -17,7 +17,7 @@ LONG_S = 10.0  # of work, after which all renderers are asked for: they divide i
 IDLE_S = 300.0  # without work, after which one renderer is kept: less time than starting nodes takes would not pay
 
 
-class ClusterPool(Pool):
+class ClusterPool(RendererPool):
     """Fulfils `Renderers`. A renderer for which there is no work is given back to the cluster, whose autoscaler may
     then remove the node; where there is work again, it is asked for again, which makes the autoscaler add one.
 
@@ -33,7 +33,7 @@ class ClusterPool(Pool):
         self._looking: asyncio.Task[None] | None = None
         options = Options(patience_s=cluster.options["patience_s"])
         super().__init__(
-            [Seat(Place(str(n), cluster.device, ""), options, cluster.starter(n)) for n in range(self._count)]
+            [RendererSpec(Place(str(n), cluster.device, ""), options, cluster.starter(n)) for n in range(self._count)]
         )
         for number in range(max(1, cluster.joined.room), self._count):  # nodes are added for work, not for a start
             cluster.release_node(number)

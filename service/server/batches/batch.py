@@ -93,7 +93,7 @@ class Batch:
             self.steps.measured += 1
         self.finish_if_done()
 
-    def settle(self, job: Render) -> None:
+    def move_to_row(self, job: Render) -> None:
         """An ended render is whole on the disk, and from now on a row there."""
         step = step_of(job.id)
         if self.jobs.pop(step, None) is not None:

@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import TooLarge, Unavailable
 from service.system.disk_usage import FULL, trouble
-from service.system.memory import Holder, MemoryBudget
+from service.system.memory import MemoryBudget, Reservation
 from service.system.shares import Shares
 from service.system.turns import KeyedLocks
 
@@ -187,7 +187,7 @@ class Downloads:
 
     def _in_memory(self, fill: Callable[[BinaryIO], object], most_bytes: int) -> Written:
         """Raises Unavailable, TooLarge where the memory of all callers has no room."""
-        holder = Holder()
+        holder = Reservation()
         self._memory.hold("pictures", holder, most_bytes)
         file = os.fdopen(os.memfd_create("answer"), "w+b")
         fill(file)

@@ -23,7 +23,7 @@ from service.server.renders.retention import (
     RetainedRenders,
     forget,
     in_memory,
-    settle,
+    move_to_row,
     take_up,
 )
 from service.server.renders.scene import PackedScenes
@@ -153,7 +153,7 @@ class RenderQueue:
         self._know(job)
         batch.add(step, job)
         if job.finished.is_set():
-            self._chores.start("end of a render", settle(job, batch, self._jobs))
+            self._chores.start("end of a render", move_to_row(job, batch, self._jobs))
             return
         self._slots.add(job)
         self._slots.dispatch()
@@ -302,7 +302,7 @@ class RenderQueue:
                 self._retained.add(job)
             else:
                 job.batch.ended(job)
-                self._chores.start("end of a render", settle(job, job.batch, self._jobs))
+                self._chores.start("end of a render", move_to_row(job, job.batch, self._jobs))
         self._evict()
 
     def cancel(self, job: Render) -> None:

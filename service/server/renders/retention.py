@@ -216,12 +216,12 @@ def take_up(batches: Iterable[InBatch], ended: Iterable[EndedMember], store: Ren
             batch.add_ended(each.step, each.state, monotonic(each.ended_at), store.picture_size(each.id))
 
 
-async def settle(job: Render, batch: InBatch, jobs: dict[str, Render]) -> None:
+async def move_to_row(job: Render, batch: InBatch, jobs: dict[str, Render]) -> None:
     """A render has ended: it leaves `jobs` once it is whole on the disk."""
     await job.recorded()
     if job.recorder is not None and job.recorder.whole:
         jobs.pop(job.id, None)
-        batch.settle(job)
+        batch.move_to_row(job)
 
 
 async def looked_at(

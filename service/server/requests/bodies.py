@@ -15,7 +15,7 @@ from service.problems import TooLarge, UnsupportedMedia
 from service.server.requests.parser_pool import ParserPool
 from service.server.requests.parsers import PARSERS, Kind
 from service.system.executors import parsing, waiting_for_parsers
-from service.system.memory import Holder, Limit, MemoryBudget
+from service.system.memory import Limit, MemoryBudget, Reservation
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
@@ -48,7 +48,7 @@ class Bodies:
         `ready` is awaited with the whole text, before it is parsed. Raises what that and the parser raise, and
         UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
         """
-        values = Holder()
+        values = Reservation()
         try:
             async with self._taken(request) as body:
                 if ready is not None:

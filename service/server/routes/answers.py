@@ -74,7 +74,7 @@ class NamedPreset(Named):
     group: str | None = Field(None, description="Of a scene: the part of a menu that it stands in, if not the first.")
 
 
-class RendererPlace(BaseModel):
+class RendererSpec(BaseModel):
     id: str
     vendor: str | None = Field(description="As the device's driver says it; null while nothing renders there.")
     driver: str | None = Field(description="Its renderer and version; null until it has started.")
@@ -108,7 +108,7 @@ class Info(BaseModel):
     renderer: dict[str, Any] | None = Field(
         description="What the first renderer's driver says; null: nothing renders."
     )
-    renderers: list[RendererPlace]
+    renderers: list[RendererSpec]
     sandbox: dict[str, Any] = Field(description="What the processes that read uploads have given up.")
     memory: Memory
     limits: dict[str, Any] = Field(description="What may be sent, by the names of the settings.")

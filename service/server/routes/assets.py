@@ -28,7 +28,7 @@ from service.server.routes.answers import Responses, reference
 from service.server.routes.examples import UPLOADED
 from service.server.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
-from service.system.memory import Holder
+from service.system.memory import Reservation
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -176,7 +176,7 @@ async def scene(request: Request, id: answers.AssetId, query: Annotated[PoseQuer
         return text
 
     if (text := await opening(made_from, caller_of(request))) is not None:
-        state, values = app_state(request), Holder()
+        state, values = app_state(request), Reservation()
         try:
             hold = partial(state.memory.hold, "bodies", values)
             found = await state.bodies.parsed("recipe", bytearray(text), caller_of(request), hold)
@@ -222,7 +222,7 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
         return text
 
     if (text := await opening(made_from, caller_of(request))) is not None:
-        state, values = app_state(request), Holder()
+        state, values = app_state(request), Reservation()
         try:
             hold = partial(state.memory.hold, "bodies", values)
             found = await state.bodies.parsed("recipe", bytearray(text), caller_of(request), hold)

@@ -14,7 +14,7 @@ from gpu.precompile.kernel_keys import common_keys
 from service.config import Ahead, ConfigError, load_config
 from service.ipc.messages import Done, StopRule, Update
 from service.renderers.local.supervisor import Supervisor
-from service.renderers.pool.devices import seats
+from service.renderers.pool.devices import renderer_specs
 from service.server import app
 from service.worker.foreseen import ForeseenKernels
 from service.worker.helpers.compile_client import CompileClient
@@ -25,7 +25,7 @@ from tests.supervisors import SIZE, Ears, Rendering, arrays_of, compile_helpers,
 @pytest.mark.parametrize("ahead", get_args(Ahead))
 def test_each_renderer_has_the_server_s_setting(ahead: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SUNBOX_AHEAD", ahead)
-    assert [seat.options.ahead for seat in seats(load_config(devices="llvmpipe:2"), 1000)] == [ahead] * 2
+    assert [seat.options.ahead for seat in renderer_specs(load_config(devices="llvmpipe:2"), 1000)] == [ahead] * 2
 
 
 def test_another_word_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from service.ipc import channel
 from service.renderers.local import process
 from service.renderers.local.process import THREADS, Options
 from service.renderers.pool import devices as seating
-from service.renderers.pool.devices import NoDevices, missing_device, of_cuda, seats
+from service.renderers.pool.devices import NoDevices, missing_device, of_cuda, renderer_specs
 from service.server import launch
 from service.system.child_processes import inherited_environment
 from service.worker import list_devices
@@ -38,13 +38,13 @@ def five_cores(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_one_renderer_where_nothing_is_said() -> None:
-    (seat,) = seats(Config(device=3, gpu_memory=7), 1000)
+    (seat,) = renderer_specs(Config(device=3, gpu_memory=7), 1000)
     assert (seat.place.id, seat.place.device, seat.options.device, seat.options.software) == ("0", "3", 3, False)
     assert (seat.options.memory, seat.options.host_memory, seat.options.cores) == (7, 1000, None)
 
 
 def test_a_renderer_for_each_device() -> None:
-    first, second = seats(load_config(devices=" 2, 00", gpu_memory=7), 1000)
+    first, second = renderer_specs(load_config(devices=" 2, 00", gpu_memory=7), 1000)
     assert (first.place.id, first.place.device, first.options.device) == ("0", "2", 2)
     assert (second.place.id, second.place.device, second.options.device) == ("1", "0", 0)
     assert first.options.memory == 7, "each has a memory of its own"
@@ -52,7 +52,7 @@ def test_a_renderer_for_each_device() -> None:
 
 
 def test_renderers_on_the_processor_divide_it(five_cores: None) -> None:
-    found = seats(load_config(devices="llvmpipe:3", gpu_memory=600), 1000)
+    found = renderer_specs(load_config(devices="llvmpipe:3", gpu_memory=600), 1000)
     assert [seat.place.id for seat in found] == ["0", "1", "2"]
     assert [seat.options.cores for seat in found] == [2, 2, 1]
     assert {seat.place.device for seat in found} == {"llvmpipe"} and all(seat.options.software for seat in found)
@@ -66,7 +66,7 @@ def test_more_renderers_than_cores_are_slow_and_have_one_each(
         raise OSError(errno.EADDRINUSE, "Address already in use")
 
     config = load_config(devices="llvmpipe:7")
-    assert [seat.options.cores for seat in seats(config, 1000)] == [1] * 7
+    assert [seat.options.cores for seat in renderer_specs(config, 1000)] == [1] * 7
     monkeypatch.setattr(launch, "missing_device", lambda config: None)
     monkeypatch.setattr(launch, "listen", taken)
     for value, warned in (("llvmpipe:7", True), ("llvmpipe:5", False), ("0,1", False)):

@@ -15,7 +15,7 @@ import pytest
 from gpu import Renderer, RenderSettings, SceneEdit
 from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
 from service.renderers.local.process import Options, Process
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.protocol import Place
 from tests.families import FamilyRenderer
 from tests.serving import PATIENCE_S
@@ -48,7 +48,7 @@ class _Divided:
     """A pool of three renderers with one render at a time, and what it is told of it."""
 
     def __init__(self) -> None:
-        self.pool = Pool([Seat(Place(str(n)), start=partial(self._start, n)) for n in range(3)])
+        self.pool = RendererPool([RendererSpec(Place(str(n)), start=partial(self._start, n)) for n in range(3)])
         self.ears = Ears()
         self.task = 0
         self.broken: int | None = None  # the renderer that does not begin any more

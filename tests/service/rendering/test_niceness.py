@@ -14,7 +14,7 @@ import pytest
 
 from service import containers
 from service.config import NICENESS, load_config
-from service.renderers.pool.devices import seats
+from service.renderers.pool.devices import renderer_specs
 from service.system import cpu
 from service.system.cpu import raise_thread_niceness
 from tests.serving import SCENE, SMALL, Server, families
@@ -117,7 +117,7 @@ def test_a_container_s_processes_give_way_to_nobody(
     for name in containers.VARIABLES:
         monkeypatch.delenv(name, raising=False)
     assert load_config().nice == steps
-    assert [seat.options.nice for seat in seats(load_config(nice=7), 1000)] == [7]
+    assert [seat.options.nice for seat in renderer_specs(load_config(nice=7), 1000)] == [7]
 
 
 def test_a_thread_that_has_ended_is_skipped(caplog: pytest.LogCaptureFixture) -> None:

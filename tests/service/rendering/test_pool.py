@@ -26,7 +26,7 @@ from service.ipc.messages import (
 from service.ipc.task_control import ApplyNow, Pause, Resume
 from service.problems import Unavailable
 from service.renderers.local.process import NoPlace
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.protocol import Place
 from tests.service.rendering.fakes import Fake
 from tests.supervisors import LINEAR, Ears, arrays_of, settings
@@ -37,7 +37,9 @@ class Fakes:
 
     def __init__(self, *drivers: str) -> None:
         self.drivers, self.processes = list(drivers), dict[int, Fake]()
-        self.pool = Pool([Seat(Place(str(i), str(i)), start=partial(self._start, i)) for i in range(len(drivers))])
+        self.pool = RendererPool(
+            [RendererSpec(Place(str(i), str(i)), start=partial(self._start, i)) for i in range(len(drivers))]
+        )
 
     def _start(self, number: int, *given: Any) -> Any:
         self.processes[number] = Fake(self.drivers[number], *given)

@@ -27,7 +27,7 @@ from service.ipc.messages import (
 )
 from service.renderers.local.process import Options, Process
 from service.renderers.local.supervisor import Supervisor
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.protocol import Place
 from tests.supervisors import LINEAR, Ears, Rendering, arrays_of, renderer_options, settings
 
@@ -41,19 +41,19 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
     def start(*given: Any) -> Process:
         return Process(Options(device=99) if broken else renderer_options(checkpoint_s=0.1), *given)
 
-    async def rendering(pool: Pool, ears: Ears, samples: int) -> int:
+    async def rendering(pool: RendererPool, ears: Ears, samples: int) -> int:
         task = pool.open(ears, "render")
         size = settings(96, seed=4)
         await pool.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(samples)))
         return task
 
-    async def picture(pool: Pool, task: int, ears: Ears) -> Any:
+    async def picture(pool: RendererPool, task: int, ears: Ears) -> Any:
         pool.send(Read(task, 1, LINEAR))
         return np.array((await ears.next(Image)).pixels)
 
     async def test() -> None:
         nonlocal broken
-        pool = Pool([Seat(Place("0"), renderer_options()), Seat(Place("1"), start=start)])
+        pool = RendererPool([RendererSpec(Place("0"), renderer_options()), RendererSpec(Place("1"), start=start)])
         pool.start()
         try:
             while not all(member.state == "ready" for member in pool.members):

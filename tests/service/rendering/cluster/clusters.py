@@ -15,7 +15,7 @@ from pathlib import Path
 from service.ipc.messages import StopRule, Update
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
-from service.renderers.pool.pool import Pool, Seat
+from service.renderers.pool.pool import RendererPool, RendererSpec
 from service.renderers.protocol import Place
 from service.renderers.ray.cluster import Cluster
 from tests.supervisors import Ears, arrays_of, settings
@@ -34,22 +34,22 @@ ENDLESS = 1 << 24
 OPTIONS = {"patience_s": 10.0, "checkpoint_s": 0.05, "ahead": "off"}
 
 
-async def begun(renderers: Pool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
+async def begun(renderers: RendererPool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
     ears = Ears()
     task = renderers.open(ears, "render")
     await renderers.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
     return task, ears
 
 
-def seats(cluster: Cluster) -> list[Seat]:
+def renderer_specs(cluster: Cluster) -> list[RendererSpec]:
     return [
-        Seat(Place(str(number), "ray"), Options(), cluster.starter(number))
+        RendererSpec(Place(str(number), "ray"), Options(), cluster.starter(number))
         for number in range(cluster.joined.renderers)
     ]
 
 
-async def with_pool(cluster: Cluster, test: Callable[[Pool], Awaitable[None]]) -> None:
-    pool = Pool(seats(cluster))
+async def with_pool(cluster: Cluster, test: Callable[[RendererPool], Awaitable[None]]) -> None:
+    pool = RendererPool(renderer_specs(cluster))
     pool.start()
     try:
         await pool.ready(30)

@@ -15,7 +15,7 @@ import pytest
 from gpu import Renderer
 from service.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
 from service.renderers.local.supervisor import Supervisor
-from service.renderers.pool.pool import Pool
+from service.renderers.pool.pool import RendererPool
 from service.renderers.ray import cluster as clusters
 from service.renderers.ray.cluster import RESTS, Cluster
 from tests.service.rendering.cluster.clusters import (
@@ -34,7 +34,7 @@ pytestmark = [pytest.mark.ray, pytest.mark.slow]
 
 SECRET = "a key of callers"
 
-Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
+Run = Callable[[Callable[[RendererPool], Awaitable[None]]], None]
 
 
 @pytest.fixture(scope="module")
@@ -69,17 +69,17 @@ def expected(gpu: Renderer) -> np.ndarray:
     return found[0]
 
 
-async def picture(renderers: Pool | Supervisor, task: int, ears: Ears) -> np.ndarray:
+async def picture(renderers: RendererPool | Supervisor, task: int, ears: Ears) -> np.ndarray:
     renderers.send(Read(task, 1, LINEAR))
     return np.array((await ears.next(Image)).pixels)
 
 
-def restarts(pool: Pool, cause: str) -> int:
+def restarts(pool: RendererPool, cause: str) -> int:
     return sum(member.statistics.restarts[cause] for member in pool.members)
 
 
 def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         await until(lambda: all(member.state == "ready" for member in pool.members))
         for task, ears in [await begun(pool), await begun(pool)]:
             assert (await ears.next(Done)).saved is not None
@@ -89,7 +89,7 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
 
 
 def test_a_gateway_that_hangs_is_replaced(run: Run, cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         assert pool.process_id is not None
         before = pool.process_id
         await asyncio.sleep(1.2)  # past its first sign of life
@@ -104,7 +104,7 @@ def test_a_gateway_that_hangs_is_replaced(run: Run, cluster: Cluster, monkeypatc
 
 
 def test_callers_keys_stay_with_the_server(run: Run) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         assert pool.process_id is not None
         everybody = [pool.process_id, *descendants(pool.process_id, "")]
         assert len(everybody) > 5
@@ -118,7 +118,7 @@ def test_callers_keys_stay_with_the_server(run: Run) -> None:
 def test_a_cluster_of_ones_own_is_closed_to_others(run: Run, cluster: Cluster) -> None:
     """It listens on the loopback address alone, and its files are its user's."""
 
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         assert cluster.joined.address.startswith("127.0.0.1:") and pool.process_id is not None
         found = {address for pid in descendants(pool.process_id, "") for address in listening(pid)}
         assert found and all(address.endswith("0100007F") for address in found), found  # 127.0.0.1, also within IPv6
@@ -143,7 +143,7 @@ def listening(pid: int) -> Iterator[str]:
 
 
 def test_actors_divide_a_render(run: Run) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         await until(lambda: all(member.state == "ready" for member in pool.members))
         before = [member.statistics.samples for member in pool.members]
         task, ears = await begun(pool, 1000)
@@ -166,7 +166,7 @@ def test_actors_divide_a_render(run: Run) -> None:
 
 @pytest.mark.parametrize(("word", "cause"), [("service.worker", "killed"), ("ray::Renderer", "node lost")])
 def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.ndarray, word: str, cause: str) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         assert pool.process_id is not None
         task, ears = await begun(pool, ENDLESS)
         await ears.next(Checkpoint)
@@ -181,7 +181,7 @@ def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.nd
 
 
 def test_a_renderer_that_is_not_needed_is_given_back(run: Run, cluster: Cluster, expected: np.ndarray) -> None:
-    async def test(pool: Pool) -> None:
+    async def test(pool: RendererPool) -> None:
         assert pool.process_id is not None
         await until(lambda: all(member.state == "ready" for member in pool.members))
         cluster.release_node(1)

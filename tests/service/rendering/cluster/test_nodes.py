@@ -10,9 +10,9 @@ import pytest
 from gpu import Renderer
 from service.ipc.messages import Checkpoint, Progressed
 from service.problems import Unavailable
-from service.renderers.pool.pool import Pool
+from service.renderers.pool.pool import RendererPool
 from service.renderers.ray.cluster import Cluster
-from tests.service.rendering.cluster.clusters import ENDLESS, OPTIONS, Nodes, begun, seats, until
+from tests.service.rendering.cluster.clusters import ENDLESS, OPTIONS, Nodes, begun, renderer_specs, until
 
 pytestmark = [pytest.mark.ray, pytest.mark.slow]
 
@@ -28,7 +28,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nodes]:
 def test_it_shrinks_to_nothing_and_grows(gpu: Renderer, nodes: Nodes) -> None:
     async def test() -> None:
         cluster = Cluster(nodes.address, 1, False, OPTIONS, nodes_s=0.0)
-        pool = Pool(seats(cluster))
+        pool = RendererPool(renderer_specs(cluster))
         pool.start()
         try:
             await until(lambda: pool.waiting)
