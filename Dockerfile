@@ -5,8 +5,8 @@
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data sunbox
 #   docker run --rm --init --read-only --cap-drop ALL --security-opt no-new-privileges \
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
-# With any of these extras: usd (USD files), ray (the nodes of a cluster, docs/scaling.md), plot (figures of `sunbox bsdf`)
-# and ffmpeg (animations as .mp4):
+# With any of these extras: usd (USD files), models (FBX, COLLADA, 3DS, X3D, 3MF), cad (STEP), ray (the nodes of a cluster,
+# docs/scaling.md), plot (figures of `sunbox bsdf`) and ffmpeg (animations as .mp4):
 #   docker build --build-arg EXTRAS="usd ffmpeg" -t sunbox .
 # With the kernels of the processor that builds it, which take 2 min: docker build --build-arg WARM=1 -t sunbox .
 # Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22. By digest,
@@ -16,15 +16,15 @@ FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eeba
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
-COPY requirements.serve.lock requirements.ray.lock requirements.usd.lock requirements.plot.lock requirements.build.lock ./
+COPY requirements.*.lock ./
 ARG EXTRAS=
 # All locks have the same version of what several of them need (a test).
 RUN set -- -r requirements.serve.lock; \
     for extra in $EXTRAS; do \
         case "$extra" in \
-            usd|ray|plot) set -- "$@" -r "requirements.$extra.lock" ;; \
+            usd|models|cad|ray|plot) set -- "$@" -r "requirements.$extra.lock" ;; \
             ffmpeg|materialx) ;; \
-            *) echo "EXTRAS: there is no extra '$extra'; there are usd, ray, plot and ffmpeg" >&2; exit 1 ;; \
+            *) echo "EXTRAS: there is no extra '$extra'; there are usd, models, cad, ray, plot and ffmpeg" >&2; exit 1 ;; \
         esac; \
     done; \
     /opt/sunbox/bin/pip install --require-hashes --only-binary :all: "$@"

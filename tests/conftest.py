@@ -88,7 +88,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if not {"ray", "notebook"}.isdisjoint(mark.name for mark in item.iter_markers()):
             item.add_marker(pytest.mark.slow)  # 500 MB are installed for them
-    for marker, package in (("ray", "ray"), ("notebook", "jupyterlab"), ("usd", "pxr")):
+    for marker, package in (
+        ("ray", "ray"),
+        ("notebook", "jupyterlab"),
+        ("usd", "pxr"),
+        ("models", "cmeel"),
+        ("cad", "cascadio"),
+    ):
         if importlib.util.find_spec(package) is None and not os.environ.get("CI"):
             reason = f"{package} is not installed: .venv/bin/pip install -r requirements.{marker}.lock"
             for item in items:

@@ -123,7 +123,10 @@ def test_the_notebook_is_tested_with_what_is_locked() -> None:
     assert {name: everything.get(name, pin) for name, pin in notebook.items()} == notebook
 
 
-@pytest.mark.parametrize(("extra", "package"), [("usd", "usd-core"), ("ray", "ray"), ("plot", "matplotlib")])
+EXTRAS = {"usd": "usd-core", "models": "cmeel-assimp", "cad": "cascadio", "ray": "ray", "plot": "matplotlib"}
+
+
+@pytest.mark.parametrize(("extra", "package"), EXTRAS.items())
 def test_an_image_with_extras_has_what_was_tested(extra: str, package: str) -> None:
     """CI installs these locks into one environment, and so does an image: all have the same versions of what several
     of them need."""
@@ -133,6 +136,5 @@ def test_an_image_with_extras_has_what_was_tested(extra: str, package: str) -> N
     )
     assert package in lock and package not in serve and serve.items() <= lock.items()
     assert {name: everything.get(name, pin) for name, pin in lock.items()} == lock
-    dockerfile = (ROOT / "Dockerfile").read_text()
-    assert f"requirements.{extra}.lock" in dockerfile and re.search(rf"\b{extra}\b.*\) set -- ", dockerfile)
+    assert re.search(rf"[ |]{extra}[|)].*set -- ", (ROOT / "Dockerfile").read_text())
     assert f"!requirements.{extra}.lock" in (ROOT / ".dockerignore").read_text()

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from service.server.assets import AssetStore, FileAssets
 
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip", ".mtlx", ".usd", ".usda", ".usdc", ".usdz")
-WHOLE = ("glb", "zip", "ply", "stl", "usd")  # formats that are one file
+WHOLE = ("glb", "zip", "ply", "stl", "usd", *formats.FOREIGN)  # formats that are one file
+SUFFIXES = tuple(f".{each}" for each, format in formats.SUFFIXES.items() if format in (*WHOLE, "gltf", "obj", "mtlx"))
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 

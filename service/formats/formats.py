@@ -4,6 +4,7 @@ import re
 import struct
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from functools import cache
+from importlib import metadata
 from importlib.util import find_spec
 from mmap import mmap
 
@@ -11,12 +12,17 @@ from service.formats.types import Kind
 
 COMPRESSIONS = ("draco", "meshopt", "ktx2")  # of meshes and images inside glTF files
 
+MODELS = ("fbx", "dae", "3ds", "x3d", "3mf")  # that Assimp reads
+FOREIGN = (*MODELS, "step")  # that a library turns into glTF
+
 # What installs the package that a format needs, and the module by which it is known to be there.
 PACKAGES: dict[str, tuple[str, str]] = {
     "meshopt": ("meshopt", "meshopt"),
     "ktx2": ("opengl-basisu", "opengl_basisu"),
     "mtlx": ("sunbox-server[materialx]", "MaterialX"),
     "usd": ("sunbox-server[usd]", "pxr"),
+    "step": ("sunbox-server[cad]", "cascadio"),
+    **dict.fromkeys(MODELS, ("sunbox-server[models]", "cmeel")),
 }
 
 KINDS: dict[str, Kind] = {
@@ -28,6 +34,8 @@ KINDS: dict[str, Kind] = {
     "zip": "scene",  # or "materials", by what is in it
     "mtlx": "materials",
     "usd": "scene",
+    **dict.fromkeys(MODELS, "scene"),
+    "step": "scene",
     "exr": "image",
     "hdr": "image",
     "png": "image",
@@ -54,6 +62,8 @@ MAGIC = (
     (b"ply\n", "ply"),
     (b"ply\r", "ply"),
     (b"tensor_file\0", "bsdf"),
+    (b"Kaydara FBX Binary", "fbx"),
+    (b"ISO-10303-21;", "step"),
     (struct.pack("<3i", 90, 90, 180), "binary"),
 )
 
@@ -69,6 +79,11 @@ CONTENT_TYPES = {
     "model/vnd.usd+zip": "usd",
     "model/vnd.usdz+zip": "usd",
     "model/vnd.usda": "usd",
+    "model/vnd.collada+xml": "dae",
+    "model/x3d+xml": "x3d",
+    "application/vnd.ms-3mfdocument": "3mf",
+    "model/3mf": "3mf",
+    "model/step": "step",
     "application/zip": "zip",
     "application/x-zip-compressed": "zip",
     "application/mtlx+xml": "mtlx",
@@ -83,6 +98,23 @@ CONTENT_TYPES = {
 }
 
 SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr", "usda": "usd", "usdc": "usd"}
+SUFFIXES |= {"usdz": "usd", "stp": "step", "p21": "step"}
+
+# What cannot be read, and what its program can write instead; by the first bytes, or by the name.
+CAD_FILES = ("iges", "igs", "sldprt", "sldasm", "ipt", "iam", "catpart", "f3d", "prt")
+UNREADABLE = (
+    (b"BLENDER", ("blend",), "Blender's files are not supported; export glTF (.glb) from Blender"),
+    (None, ("max",), "3ds Max's files are not supported; export FBX or glTF from 3ds Max"),
+    (b"QC4DC4D6", ("c4d",), "Cinema 4D's files are not supported; export FBX or glTF from Cinema 4D"),
+    (None, ("ma", "mb"), "Maya's files are not supported; export FBX or USD from Maya"),
+    (b"\xff\xfe\xff\x0e", ("skp",), "SketchUp's files are not supported; export glTF or COLLADA (.dae)"),
+    (None, ("hip", "hipnc"), "Houdini's files are not supported; export USD or glTF from Houdini"),
+    (None, ("3dm",), "Rhino's files are not supported; export glTF, OBJ or STEP from Rhino"),
+    (None, ("ztl", "zpr"), "ZBrush's files are not supported; export OBJ or FBX from ZBrush"),
+    (None, ("lwo", "lws"), "LightWave's files are not supported; export FBX or OBJ"),
+    (b"AC10", ("dwg", "dxf"), "AutoCAD's drawings are not supported; export STEP or FBX"),
+    (None, CAD_FILES, "this CAD format is not supported; export STEP from the program that wrote it"),
+)
 
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
@@ -90,18 +122,35 @@ OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|m
 CUBE_START = re.compile(
     rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:TITLE|LUT_[13]D_SIZE|LUT_[13]D_INPUT_RANGE|DOMAIN_MIN|DOMAIN_MAX)[ \t]"
 )
+FBX_TEXT = re.compile(rb"\s*+;\s*FBX \d")
+THREE_DS = 0x4D4D  # the chunk that holds all others
+PACKAGE_3MF = re.compile(rb"3D/[^/\0]{1,200}\.model|3D/_rels/", re.IGNORECASE)
 STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
-# After what XML has before its root; possessive for the same reason.
-MTLX_TEXT = re.compile(
-    rb"(?:\s++|<\?[^>]*+>|<!--(?:(?!-->).)*+-->|<![A-Z][^>\[]*+(?:\[[^\]]*+\]\s*+)?>)*+<materialx[\s>]", re.DOTALL
+# What XML has before its root; possessive for the same reason.
+BEFORE_ROOT = rb"(?:\s++|<\?[^>]*+>|<!--(?:(?!-->).)*+-->|<![A-Z][^>\[]*+(?:\[[^\]]*+\]\s*+)?>)*+"
+MTLX_TEXT = re.compile(BEFORE_ROOT + rb"<materialx[\s>]", re.DOTALL)
+XML_TEXTS = (
+    (re.compile(BEFORE_ROOT + rb"<COLLADA[\s>]", re.DOTALL), "dae"),
+    (re.compile(BEFORE_ROOT + rb"<X3D[\s>]", re.DOTALL), "x3d"),
 )
 
 
 @cache
 def missing() -> dict[str, str]:
     """The formats that cannot be read here, with what would have to be installed."""
-    return {name: package for name, (package, module) in PACKAGES.items() if find_spec(module) is None}
+    found = {name: package for name, (package, module) in PACKAGES.items() if find_spec(module) is None}
+    return found | ({} if assimp() else {name: PACKAGES[name][0] for name in MODELS})
+
+
+@cache
+def assimp() -> str | None:
+    """The path of Assimp's library; None where its package is not installed."""
+    try:
+        listed = metadata.files("cmeel-assimp") or ()
+    except metadata.PackageNotFoundError:
+        return None
+    return next((str(file.locate()) for file in listed if str(file).endswith("lib/libassimp.so")), None)
 
 
 def text(data: bytes) -> bytes:
@@ -119,7 +168,7 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
     head = data[:65536]
     for magic, name in MAGIC:
         if head.startswith(magic):
-            return "usd" if name == "zip" and _is_usdz(head) else name
+            return _package(head, data, filename) if name == "zip" else name
     if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
         return "webp"
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):
@@ -131,6 +180,13 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
         return "gltf"
     if MTLX_TEXT.match(words):
         return "mtlx"
+    for pattern, name in XML_TEXTS:
+        if pattern.match(words):
+            return name
+    if FBX_TEXT.match(words):
+        return "fbx"
+    if len(head) >= 6 and struct.unpack_from("<HI", head) == (THREE_DS, len(data)):
+        return "3ds"
     if CUBE_START.match(words):
         return "cube"
     if OBJ_START.match(words):
@@ -139,6 +195,24 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
     if named in CONTENT_TYPES:
         return CONTENT_TYPES[named]
     return SUFFIXES.get((filename or "").rpartition(".")[2].lower())
+
+
+def _package(head: bytes, data: bytes | mmap, filename: str | None) -> str:
+    """The format of a zip: of USD and 3MF the zip is the file."""
+    if _is_usdz(head):
+        return "usd"
+    # Its directory stands at the end.
+    is_named = (filename or "").lower().endswith(".3mf")
+    return "3mf" if is_named or PACKAGE_3MF.search(head) or PACKAGE_3MF.search(data[-65536:]) else "zip"
+
+
+def advice(head: bytes, filename: str | None) -> str | None:
+    """A sentence for a file of a program whose format cannot be read; None for any other."""
+    suffix = (filename or "").rpartition(".")[2].lower()
+    for magic, suffixes, said in UNREADABLE:
+        if suffix in suffixes or (magic is not None and head.startswith(magic)):
+            return said
+    return None
 
 
 def _is_usdz(head: bytes) -> bool:

@@ -8,7 +8,7 @@ import os
 import shutil
 from typing import BinaryIO
 
-from service.formats.formats import sniff
+from service.formats.formats import advice, sniff
 
 Source = bytes | memoryview | BinaryIO  # a file has been written in full
 
@@ -31,6 +31,13 @@ def format_of(source: Source, content_type: str | None = None, filename: str | N
         return sniff(bytes(source), content_type, filename)
     with mmap.mmap(source.fileno(), 0, access=mmap.ACCESS_READ) as view:
         return sniff(view, content_type, filename)
+
+
+def unreadable(source: Source, filename: str | None) -> str | None:
+    """As `advice`."""
+    if isinstance(source, bytes | memoryview):
+        return advice(bytes(source[:16]), filename)
+    return advice(os.pread(source.fileno(), 16, 0), filename)
 
 
 def for_sandbox(source: Source) -> bytes | int:

@@ -37,7 +37,7 @@ from dataclasses import asdict
 from service.system.confined import child as layers, confine, renounce
 folder, victim, layer = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 if layer == "landlock":
-    layers.filter_system_calls = lambda calls: False
+    layers.filter_system_calls = lambda calls, writes_memory: False
 if layer == "seccomp":
     layers.allow_reading_only = lambda calls, paths: 0
 libc = ctypes.CDLL(None, use_errno=True)

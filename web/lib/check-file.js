@@ -7,7 +7,7 @@ const GLB = { magic: 0x46546c67, header: 12 }; // "glTF"; then a version, and th
 export async function checkFile(file, { missing = {} }) {
   if (!file.size) throw new Error("The file is empty.");
   const ending = file.name.split(".").at(-1).toLowerCase();
-  const format = ending.startsWith("usd") ? "usd" : ending;
+  const format = ending.startsWith("usd") ? "usd" : ending === "stp" ? "step" : ending;
   if (missing[format]) throw new Error(`${format.toUpperCase()} files need ${missing[format]} on the server.`);
   if (ending !== "glb") return;
   const head = new DataView(await file.slice(0, GLB.header).arrayBuffer());

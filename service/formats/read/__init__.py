@@ -13,6 +13,7 @@ rendered     OpenEXR files that Sunbox wrote: colour, its variance and its sampl
 cube         tables of colours, one or three axes
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 measured     measured reflection
+foreign        FBX, COLLADA, 3DS, X3D, 3MF and STEP by libraries that write glTF
 usd          USD
 materialx    MaterialX
 texture_sets  images that make materials by their names

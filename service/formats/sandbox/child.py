@@ -34,8 +34,8 @@ LARGE = 1 << 20  # bytes of a file after which freed memory is returned to the s
 EARLY = ("PIL.Image", "PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.WebPImagePlugin", "OpenImageIO", "DracoPy")
 
 
-def main() -> None:
-    link = begin(EARLY)
+def main(writes_memory: bool = False) -> None:
+    link = begin(EARLY, writes_memory)
     is_capped = False
     while True:
         try:
@@ -86,7 +86,9 @@ Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPic
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
+    from service.formats.formats import FOREIGN
     from service.formats.read.cube import parse_cube
+    from service.formats.read.foreign.importer import read_foreign_scene
     from service.formats.read.gltf.importer import read_scene
     from service.formats.read.image import SIGNATURES, parse_image
     from service.formats.read.measured.adaptive import parse_adaptive
@@ -114,6 +116,8 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
         return parse_mtlx(mapped, limits)
     if format == "usd":
         return read_usd_scene(mapped, limits)
+    if format in FOREIGN:
+        return read_foreign_scene(format, mapped, limits, pose)
     return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits, pose)
 
 

@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 
 from service.formats.errors import MissingExtra, ParseError
-from service.formats.formats import PACKAGES, text
+from service.formats.formats import FOREIGN, PACKAGES, text
 from service.formats.read.materialx.importer import ALONE, SUFFIX, read_materialx
 from service.formats.read.mesh_checks import mesh_oddities
 from service.formats.read.obj.archive import Archive
@@ -116,6 +116,15 @@ def parse_mtlx(data: memoryview, limits: AssetLimits) -> SceneFile:
     return read_materialx([ALONE], lambda name: bytes(data), limits)
 
 
+def _foreign(format: str) -> Callable[[memoryview, AssetLimits], RawMesh]:
+    def read(data: memoryview, limits: AssetLimits) -> RawMesh:
+        from service.formats.read.foreign.importer import read_foreign_mesh
+
+        return read_foreign_mesh(format, data, limits)
+
+    return read
+
+
 MESH_READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "obj": _obj,
     "ply": _ply,
@@ -125,4 +134,5 @@ MESH_READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "zip": _zip,
     "mtlx": _mtlx,
     "usd": read_usd_mesh,
+    **{format: _foreign(format) for format in FOREIGN},
 }

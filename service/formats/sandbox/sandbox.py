@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from service.formats.errors import MissingExtra, ParseError
-from service.formats.formats import KINDS
+from service.formats.formats import FOREIGN, KINDS
 from service.formats.read.measured import transfer
 from service.formats.sandbox.wire import Array, adopt, memory, receive, send
 from service.formats.types import (
@@ -83,6 +83,7 @@ class Sandbox:
         self._asking = threading.Lock()
         self._rights: Rights | None = None
         self.children = Children("service.formats.sandbox.child", FILES, ENVIRONMENT)
+        self._cad_children = Children("service.formats.sandbox.cad_child", FILES, ENVIRONMENT)
 
     def start(self) -> None:
         """Start a child for the first file, without waiting."""
@@ -140,7 +141,7 @@ class Sandbox:
             if format == "zip":
                 size = min(USUAL_RATIO * size, self.limits.max_file)
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
-            worst += USD_BYTES if format == "usd" else 0
+            worst += USD_BYTES if format == "usd" or format in FOREIGN else 0
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)
         caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}
@@ -149,9 +150,10 @@ class Sandbox:
             "caps": caps,
         }  # fmt: skip
         try:
-            with self.children.one() as child:
+            with (self._cad_children if format == "step" else self.children).one() as child:
                 reply, result = _ask(child, request, fd, limits)
-                child.is_spent = "error" in reply  # it may have been an attempt
+                # An error may have been an attempt; and what Assimp has read is not freed.
+                child.is_spent = "error" in reply or format in FOREIGN
         except Closed:
             raise ParseError("the service is shutting down") from None
         return _result(reply, result)
@@ -164,6 +166,7 @@ class Sandbox:
     def close(self) -> None:
         """Ends the children that wait; one that parses ends with its file."""
         self.children.close()
+        self._cad_children.close()
 
     def __enter__(self) -> "Sandbox":
         return self

@@ -16,7 +16,7 @@ from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.read.scenes.plain_mesh import plain_scene
 from service.formats.scene_import import Imported, take_apart
-from service.formats.source import Source, digest, for_sandbox, format_of, length
+from service.formats.source import Source, digest, for_sandbox, format_of, length, unreadable
 from service.formats.types import (
     AssetInfo,
     HasLimits,
@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
-    "make materials by their names; USD; MaterialX; "
+    "make materials by their names; USD; MaterialX; FBX, COLLADA, 3DS, X3D, 3MF and STEP; "
     "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours; measured "
     "reflection as MERL .binary and RGL .bsdf files"
 )
@@ -112,7 +112,9 @@ class AssetStore:
             raise AssetError("the asset is empty")
         format = format_of(data, content_type, filename)
         if format is None:
-            raise UnsupportedMedia(f"the format is not supported; supported are {FORMATS}")
+            raise UnsupportedMedia(
+                unreadable(data, filename) or f"the format is not supported; supported are {FORMATS}"
+            )
         if KINDS[format] in TAKEN_APART:
             return self._import(id, format, data, True, room, title)[0]
         info = self._described(id, format, data)

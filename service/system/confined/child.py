@@ -28,12 +28,13 @@ from service.system.cpu import raise_thread_niceness
 from service.system.lifeline import end_with_pipe
 
 
-def begin(modules: Iterable[str] = ()) -> socket.socket:
+def begin(modules: Iterable[str] = (), writes_memory: bool = False) -> socket.socket:
     """The socket to the parent, whose descriptor is the child's first argument. The second is a pipe's, whose other
     end the parent holds: the child ends with it, even inside a library's loop. The third is its niceness.
 
     The child has given up all rights that it does not need, and has sent the parent their list. Before, while it
-    could open files, it imported `modules`.
+    could open files, it imported `modules`. `writes_memory`: a library of the child writes files in memory by their
+    names, which it may where Landlock keeps it from all others.
     """
     link = socket.socket(fileno=int(sys.argv[1]))
     # Not by a signal from `link`: the one that a message sends may come when the message has been read, and work on
@@ -42,7 +43,7 @@ def begin(modules: Iterable[str] = ()) -> socket.socket:
         sys.exit()
     for name in modules:
         importlib.import_module(name)
-    link.sendmsg([json.dumps(asdict(renounce(confine(int(sys.argv[3]))))).encode()])
+    link.sendmsg([json.dumps(asdict(renounce(confine(int(sys.argv[3])), writes_memory))).encode()])
     return link
 
 
@@ -150,7 +151,7 @@ class Rights:
         return [name for name, value in asdict(self).items() if not value and name not in covered]
 
 
-def renounce(no_network: bool) -> Rights:
+def renounce(no_network: bool, writes_memory: bool = False) -> Rights:
     """Give up for good what is not needed to parse files that are open, with libraries that may still be loaded.
 
     To be called while the process has one thread. `no_network` is what `confine` said.
@@ -162,7 +163,7 @@ def renounce(no_network: bool) -> Rights:
     if calls is None:
         return Rights(no_new_privileges, no_capabilities, no_network, hidden)
     restricted = allow_reading_only(calls, readable())
-    filtered = filter_system_calls(calls)
+    filtered = filter_system_calls(calls, writes_memory and restricted > 0)
     return Rights(no_new_privileges, no_capabilities, no_network, hidden, restricted, filtered)
 
 

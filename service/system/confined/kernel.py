@@ -102,20 +102,22 @@ REQUESTS = (0x5421, 0x541B, 0x5451, 0x5450)  # FIONBIO, FIONREAD, FIOCLEX, FIONC
 Instruction = tuple[int, int, int, int]  # code, jump if true, jump if false, constant
 
 
-def filter_system_calls(calls: SystemCalls) -> bool:
+def filter_system_calls(calls: SystemCalls, writes_memory: bool = False) -> bool:
     """The kernel refuses this process every system call that reading a file does not need, by a program of the
     classic Berkeley Packet Filter [McCanne and Jacobson 1993] over the call's number and arguments. What it refuses
     fails with an error, so that a library that tries something goes on without it.
 
+    `writes_memory`: files may be opened to be written, which Landlock allows of files in memory alone.
+
     Whether the filter is in force, for all threads of this process. Needs no-new-privileges."""
     libc = ctypes.CDLL(None, use_errno=True)
-    filter = program(calls, os.getpid())
+    filter = program(calls, os.getpid(), writes_memory)
     code = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *one) for one in filter))
     head = struct.pack("@HP", len(filter), ctypes.addressof(code))  # struct sock_fprog
     return bool(libc.syscall(calls.restricting["seccomp"], SET_FILTER, ALL_THREADS, head) == 0)
 
 
-def program(calls: SystemCalls, process: int) -> list[Instruction]:
+def program(calls: SystemCalls, process: int, writes_memory: bool = False) -> list[Instruction]:
     """The filter, for the process of that id."""
     number, refused = calls.special, REFUSE | errno.EPERM
     lines: list[Instruction] = [
@@ -128,7 +130,8 @@ def program(calls: SystemCalls, process: int) -> list[Instruction]:
         lines += [(EQUAL, 0, 1, call), (RETURN, 0, 0, ALLOW)]
     if "open" in number:
         lines += _case(number["open"], _bits(1, WRITING, 0), REFUSE | errno.EACCES)
-    lines += _case(number["openat"], _bits(2, WRITING, 0), REFUSE | errno.EACCES)
+    refused_flags = 0 if writes_memory else WRITING
+    lines += _case(number["openat"], _bits(2, refused_flags, 0), REFUSE | errno.EACCES)
     lines += _case(number["clone"], _bits(0, CLONE_THREAD, CLONE_THREAD), refused)  # threads, but no processes
     plain = [test for command in DESCRIPTORS for test in _same(1, command)]
     lines += _case(number["fcntl"], plain, refused)

@@ -1,0 +1,32 @@
+"""A file that a library reads as a scene document, by the one glTF reader."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from service.formats.read.foreign import assimp, cad
+from service.formats.read.foreign.glb import Find, Glb
+from service.formats.read.gltf.importer import read_scene
+from service.formats.read.gltf.merged_mesh import read_merged
+from service.formats.read.raw_mesh import RawMesh
+from service.formats.types import AssetLimits, Pose, SceneFile
+
+
+def read_foreign_scene(
+    format: str, data: memoryview, limits: AssetLimits, pose: Pose | None = None, find: Find = lambda name: None
+) -> SceneFile:
+    """The scene. `find` gives the files beside it, by the names that it has for them. Raises ParseError,
+    MissingExtra."""
+    file = _converted(format, data, find)
+    found = read_scene(file.written(), limits, pose)
+    notes = [{"pointer": "", "detail": detail} for detail in dict.fromkeys(file.warnings)]
+    return replace(found, warnings=[*notes, *found.warnings])
+
+
+def read_foreign_mesh(format: str, data: memoryview, limits: AssetLimits) -> RawMesh:
+    """All its triangles as one mesh. Raises ParseError, MissingExtra."""
+    return read_merged(_converted(format, data, lambda name: None).written(), limits)
+
+
+def _converted(format: str, data: memoryview, find: Find) -> Glb:
+    return cad.converted(bytes(data)) if format == "step" else assimp.converted(format, bytes(data), find)
