@@ -41,6 +41,7 @@ RAY = "carries all that a renderer is sent; of that turns go round clients"
 CODE = {
     "server/app.py to_thread": OWN,
     "formats/sandbox/sandbox.py self.children = Children": "one for each turn",
+    "formats/sandbox/sandbox.py self._cad_children = Children": "one for each turn",
     "formats/sandbox/sandbox.py self._room = FairRoom": "all but one for one caller, the one with fewest first",
     "server/callbacks/queue.py AT_ONCE": SHARES,
     "server/callbacks/queue.py shares = Shares": SHARES,
