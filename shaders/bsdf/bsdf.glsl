@@ -89,10 +89,11 @@ Surface surface_make(Material m, vec2 tangent) {
 // The f of the models' own functions lacks the cosine.
 Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_SCATTERING
-    if (s.in_medium) return phase_eval(s.g, wo, wi);
+    if (event_is_particle(s.event)) return phase_eval(s.g, wo, wi);
 #endif
 #if HAS_WALKS
-    if (s.exits) return wi.z > 0.0 ? Scatter(models_left(s, wi) * (INV_PI * wi.z), INV_PI * wi.z) : Scatter(vec3(0.0), 0.0);
+    if (event_is_exit(s.event))
+        return wi.z > 0.0 ? Scatter(models_left(s, wi) * (INV_PI * wi.z), INV_PI * wi.z) : Scatter(vec3(0.0), 0.0);
 #endif
 #if HAS_TRANSMISSION
     bool below = model_transmits(s.model) && wi.z < 0.0;
@@ -112,11 +113,9 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     LobeSample r = models_sample(s, wo, u_lobe, u);
 #if HAS_SCATTERING
-    if (s.in_medium) r = bsdf_rough_sample(phase_sample(s.g, u));
+    if (event_is_particle(s.event)) r = bsdf_rough_sample(phase_sample(s.g, u));
 #endif
-#if HAS_WALKS
-    if (s.exits) r = bsdf_rough_sample(sampling_cosine(u));
-#endif
+    if (event_is_exit(s.event)) r = bsdf_rough_sample(sampling_cosine(u));
     return r;
 }
 
@@ -132,24 +131,18 @@ void bsdf_make_uniform(Surface s, vec3 wo, vec2 u, inout LobeSample r) {
 #if HAS_THIN_WALLS
         through = through || s.diffuse_transmission > 0.0;
 #endif
-#if HAS_WALKS
-        through = through && !s.exits;
-#endif
+        through = through && !event_is_exit(s.event);
         if (model_transmits(s.model) && through) {
             r.wi = sampling_sphere(u);
             r.scatter.pdf *= 0.5;
         }
 #endif
         r.scatter.pdf *= 1.0 - models_delta_chance(s, wo);
-#if HAS_WALKS
-        if (s.exits) r.scatter.pdf = 0.5 * INV_PI;
-#endif
-#if HAS_SCATTERING
-        if (s.in_medium) {
+        if (event_is_exit(s.event)) r.scatter.pdf = 0.5 * INV_PI;
+        if (event_is_particle(s.event)) {
             r.wi = sampling_sphere(u);
             r.scatter.pdf = 0.25 * INV_PI;
         }
-#endif
     }
 }
 

@@ -1,6 +1,7 @@
 // A material at a point of a surface, ready for the lobes: what several models, or code for all of them, need of it.
 // What one model alone needs is in its NAME_members.glsl.
 #include "material/material.glsl"
+#include "path/event.glsl"
 
 struct Surface {
     uint model;
@@ -74,11 +75,10 @@ struct Surface {
 #endif
 #if HAS_WALKS
     float walks;    // the share of the diffuse light that walks under the surface
-    bool exits;     // light comes out that has walked there
 #endif
+    uint event;     // what scatters: the surface, or something else that a path has met
 #if HAS_SCATTERING
-    bool in_medium; // a particle scatters: by its phase function
-    float g;        // mean cosine
+    float g;        // mean cosine of a particle's scattering
 #endif
 #include "model_members.glsl"
 };
@@ -128,14 +128,13 @@ Surface surface_plain(Material m) {
     s.tangent = vec2(1.0, 0.0);
 #if HAS_WALKS
     s.walks = 0.0;
-    s.exits = false;
     if (material_walks(m)) {
         s.walks = m.subsurface;
         s.subsurface = 0.0;
     }
 #endif
+    s.event = EVENT_SURFACE;
 #if HAS_SCATTERING
-    s.in_medium = false;
     s.g = 0.0;
 #endif
     return s;
@@ -148,8 +147,5 @@ bool surface_is_broad(Surface s) {
 #if HAS_TRANSMISSION
     narrow = narrow || (model_transmits(s.model) && s.transmission > 0.5);
 #endif
-#if HAS_SCATTERING
-    narrow = narrow && !s.in_medium;
-#endif
-    return !narrow;
+    return !narrow || event_is_particle(s.event);
 }

@@ -15,9 +15,7 @@ void caustics_begin(inout Path path) {
 void caustics_note(bool is_delta, inout Path path) {
 #if CAUSTICS
     path.caustic = path.bounce == 0u ? !is_delta : path.caustic && is_delta;
-#if HAS_SCATTERING
-    path.caustic = path.caustic && !path.in_medium;
-#endif
+    path.caustic = path.caustic && !event_is_particle(path.event);
 #endif
 }
 

@@ -1,4 +1,4 @@
-// The point where a path meets a surface: its frame, its material and the bodies on both sides.
+// The point where a path meets a surface, or something else that scatters: its frame, its material and the bodies on both sides.
 struct Interaction {
     vec3 wo;       // in the shading frame
     bool behind;   // it is seen from the inner side of the geometry
@@ -15,12 +15,9 @@ struct Interaction {
     float around;  // the index of what the body lies in
     bool sparser;  // its own index is less than that
 #endif
+    uint event;    // what the path has met there: path/event.glsl
 #if HAS_SCATTERING
-#if HAS_WALKS
-    bool exits;     // light comes out that has walked under the surface
-#endif
-    bool in_medium; // there is no surface: a particle of a medium scatters
-    float g;
+    float g;       // mean cosine of what a particle scatters
 #endif
 };
 
@@ -39,11 +36,8 @@ Interaction interaction_none() {
     r.around = 1.0;
     r.sparser = false;
 #endif
+    r.event = EVENT_NONE;
 #if HAS_SCATTERING
-#if HAS_WALKS
-    r.exits = false;
-#endif
-    r.in_medium = false;
     r.g = 0.0;
 #endif
     return r;
@@ -82,7 +76,8 @@ bool interaction_dense(Interaction here) {
 void interaction_media(Material m, inout Interaction here, inout Path path) {
 #if HAS_ATTENUATION
     Medium body = medium_body(m, path.at.shape);
-    bool clear = here.transmits && !material_is_thin(m) && !scatter_was(path) && !walk_under(path);
+    bool surface = !event_is_particle(path.event) && !event_is_exit(path.event) && !walk_goes_on(path);
+    bool clear = surface && here.transmits && !material_is_thin(m);
     if (clear && here.behind && path.medium.depth < 0.5) {
         // This is the back of an open sheet: the path counts as inside a body since it began.
         path.medium = medium_entered(path.medium, body);
@@ -114,6 +109,7 @@ void interaction_tangent(SurfacePoint at, inout Material m, inout Interaction he
 // The point that the path has come to, and the material m there.
 Interaction interaction_make(inout Path path, out Material m) {
     Interaction here;
+    here.event = path.event;
     vec3 wo_w = -path.d;
     here.behind = dot(path.at.ng, wo_w) < 0.0;
     here.front = here.behind ? -path.at.ng : path.at.ng;
@@ -148,12 +144,12 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = basis_make(sides_normal(path.at, wo_w));
     here.wo = basis_to_local(here.basis, wo_w);
     here.transmits = material_transmits(m);
-    if (!scatter_was(path) && !path_passes(path) && !walk_under(path)) hues_meet(m, path.hues);
+    if (path.event == EVENT_SURFACE) hues_meet(m, path.hues);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     here.fold = here.front;
-    bool level = here.transmits || medium_around(path.medium) || scatter_was(path);
-    bool exits = walk_ends(path); // from below: what follows is seen from outside
+    bool level = here.transmits || medium_around(path.medium) || event_is_particle(path.event);
+    bool exits = event_is_exit(path.event); // from below: what follows is seen from outside
     bool lifts = terminator_begin(exits ? path.at.ng : here.front, here.behind && !exits, level, path.at);
     if (lifts) here.fold = smooth_w;
     here.facing = here.mapped ? here.fold : here.basis.z; // a folded lobe reaches all directions in front

@@ -74,12 +74,9 @@ void light_path_connect(Path path, SurfacePoint at, vec3 flux, Medium camera_med
 // Takes the path on by a perfectly specular event; another one ends it.
 void light_path_step(Interaction here, Material m, Sampler rng, inout Path path) {
     vec3 ng = path.at.ng, d = path.d;
-    bool taken = false;
-#if HAS_MIRRORS
-    taken = material_is_delta(m) && !here.mapped;
-    if (taken) delta_chain_step(here, m, rng, path);
-#endif
-    if (!taken) {
+    if (delta_chain_mirrors(here, m)) {
+        delta_chain_step(here, m, rng, path);
+    } else {
         Surface s = interaction_surface(here, hues_leading(m, path.hues));
         Asked asked;
         BsdfSample next = path_sample(s, here, rng, path, asked);
@@ -116,14 +113,12 @@ void light_path_trace(Medium camera_medium, Sampler rng, bool odd) {
             path.cone = cone_after(path.cone, path.hit.t);
             SurfacePoint at = path.at;
             Material m;
-#if HAS_PRIORITIES
-            path.passes = medium_hides(path.medium, at, path.d);
-#endif
+            path.event = path_event(path, false);
             Interaction here = interaction_make(path, m);
-#if HAS_PRIORITIES
-            if (path.passes) path_pass(here, path);
-            if (path.passes) continue;
-#endif
+            if (event_is_passage(path.event)) {
+                path_pass(here, path);
+                continue;
+            }
             bool whole = material_is_delta(m) && !here.mapped; // it has no other lobe
             bool bent = path.bounce > 1u + path.passed; // else lights are sampled for it
             if (bent && !whole) light_path_connect(path, at, e.flux * path.throughput, camera_medium, rng, odd);

@@ -38,24 +38,15 @@ Path path_begin(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
     path.radiance = vec3(0.0);
     path.bounce = 0u;
     path.alive = true;
+    path.event = EVENT_NONE;
     path.found_pdf = PDF_DELTA;
     path.counts = true;
     path.travelled = 0.0;
     path.passed = 0u;
     path.eta_scale = 1.0;
     path.medium = medium;
-#if HAS_PRIORITIES
-    path.passes = false;
-#endif
-#if HAS_WALKS
-    path.walks = path.exits = false;
-    path.walked = path.steps = 0u;
-    path.outside = medium;
-#endif
-#if HAS_SCATTERING
-    path.in_medium = false;
-    path.distance_u = 0.0;
-#endif
+    walk_begin(path);
+    scatter_begin(path);
     path.cone = cone_begin(d);
     path.hues = hues_begin(rng, turn);
     caustics_begin(path);
@@ -81,18 +72,14 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
         Interaction here;
         Material m;
         if (delta_chain(rng, path, here, m)) {
-#if HAS_WALKS
             walk_none(path);
-#endif
             Surface s = interaction_surface(here, hues_leading(m, path.hues));
             LightContext lit = direct_context(path.at, here.front, here.facing, here.transmits);
             float share = direct_share(s, path.bounce);
             BsdfSample next = path_shade(s, here, m, lit, share, rng, path);
             if (!next.straight) path.lit = lit;
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
-#if HAS_WALKS
-            if (next.enters) walk_begin(m, path);
-#endif
+            if (next.enters) walk_enter(m, path);
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);
         }
@@ -102,7 +89,6 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
 
 // The radiance that a path brings to o from the direction d, and its alpha.
 vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
-#if HAS_DISPERSION
     vec4 sum = vec4(0.0);
     bool cut = false, again;
     uint turns = 0u;
@@ -114,7 +100,4 @@ vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
     } while (again);
     path_was_cut = cut;
     return sum / float(turns);
-#else
-    return path_finish(path_follow(rng, o, d, medium, 0u));
-#endif
 }

@@ -9,7 +9,8 @@ struct Path {
     vec3 radiance_before; // found before the last bounce
     float alpha;          // 1 where the camera sees a surface, or a background that is shown
     uint bounce;
-    bool alive;           // there is a ray to follow, and after that a surface to scatter at
+    bool alive;           // there is a ray to follow, and after that something to scatter at
+    uint event;           // what has ended the ray (path/event.glsl); before the ray is traced: the one before
     // Light that is found along d is weighted by d's density per solid angle; `counts` says whether it is added at all.
     // `lit` is the surface where d begins, as its lights were sampled.
     float found_pdf;
@@ -19,19 +20,12 @@ struct Path {
     // all such surfaces of the path, whose light is not clamped because of them.
     float travelled;
     uint passed;
-    // The path has left the scene. It does so at most once, so that light from infinity is added once, by path_finish,
-    // when all neighbouring lanes have ended, too.
-    bool escaped;
     // The square of the refractive index here over that at the camera. Radiance over this square passes a boundary
     // unchanged; the factor is not part of the throughput, so that roulette does not see it.
     float eta_scale;
     Medium medium;
-#if HAS_PRIORITIES
-    bool passes;    // the ray ends at a boundary that is inside a higher body, and goes on there
-#endif
 #if HAS_WALKS
     bool walks;     // under a surface: path/walk.glsl
-    bool exits;     // the ray ends where it comes out again
     uint walked;    // how often it did so
     uint steps;     // of this walk
     uint walk_shape; // whose surface it is
@@ -39,7 +33,6 @@ struct Path {
 #endif
 #if HAS_SCATTERING
     float distance_u; // what is left of the random number that decides on the next particle
-    bool in_medium; // the ray ends at a particle (path/scatter.glsl)
 #endif
     Cone cone;
     Hues hues;
@@ -124,10 +117,12 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     path.eta_scale = sides_eta_scale(path.eta_scale, next.side, s, 0.0);
 }
 
-// Adds the light from infinity, where the path has left the scene.
+// Adds the light from infinity, where the path has left the scene. A path does so at most once: path_finish calls this when
+// all neighbouring lanes have ended, too.
 void path_add_escaped(inout Path path) {
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
     vec3 arriving = found_light_outside(path.d, path.found_pdf, path.bounce > 0u, caustics_leave_out(path)) * max(path.eta_scale, 1.0);
-    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
+    bool shows = path.event == EVENT_ESCAPE && path.counts && (path.bounce > 0u || found_light_background());
+    if (shows) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u + path.passed);
 #endif
 }

@@ -87,6 +87,22 @@ def test_only_a_models_own_files_ask_for_its_flag(model: Model) -> None:
     assert [path for path in SHADERS.rglob("*.*") if path not in own and asks.search(path.read_text())] == []
 
 
+def test_the_estimator_reads_as_a_page() -> None:
+    """Each file that it includes guards its own body, and has functions that do nothing where its flag is off."""
+    lines = (SHADERS / "path/path.glsl").read_text().splitlines()
+    assert [line for line in lines if line.lstrip().startswith("#") and not line.startswith("#include ")] == []
+    assert len(lines) <= 120
+
+
+def test_what_a_path_has_met_is_decided_at_one_place() -> None:
+    """The order of the questions matters. All other code asks for the event that came out."""
+    names = re.compile(r"\bEVENT_(ESCAPE|PARTICLE|PASSAGE|EXIT)\b")
+    found = {path.relative_to(SHADERS).as_posix(): names.findall(path.read_text()) for path in SHADERS.rglob("*.*")}
+    deciding = {"path/event.glsl", "path/path_trace.glsl"}
+    assert {path for path, events in found.items() if set(events) - {"ESCAPE"}} == deciding
+    assert {path for path, events in found.items() if events} == {*deciding, "path/path_extend.glsl"}
+
+
 def taken(source: KernelSource) -> str:
     """The text that is left when the driver has evaluated every #if; names that nothing defines are 0 there."""
     defines, lines = dict[str, str](), list[str]()

@@ -40,7 +40,7 @@ HOOKS = (
     Edit("path/path.glsl", "Surface s = interaction_surface(here, hues_leading(m, path.hues));", _event("bounce")),
     Edit("path/direct.glsl", "return lights_sample(", _event("light")),
     Edit("path/direct.glsl", "uvec2 skip = uvec2(terminator_skip(path.at, light.wi), light.id);", _ray("shadow")),
-    Edit("path/delta_chain.glsl", "delta_chain_step(here, m, rng, path);", _event("mirror")),
+    Edit("path/delta_chain.glsl", "LobeSample lobe = dispersion_sample_delta(", _event("mirror")),
     Edit("path/path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce == 0u) {_ray('camera')}"),
     Edit("path/path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce > 0u) {_ray('extension')}"),
     Edit("shapes/traverse.glsl", "uvec4 node = node_words[", _event("box")),
