@@ -42,8 +42,8 @@ def members() -> str:
 
 
 def predicates() -> str:
-    """Functions that say what the model of a number can do."""
-    return "\n".join(_predicate(trait) for trait in ("transmits", "may_be_delta", "walks"))
+    """Functions that say what the model of a number can do, and where a material has what several models need."""
+    return "\n".join([*(_predicate(trait) for trait in ("transmits", "may_be_delta", "walks")), _walk_color()])
 
 
 def text() -> str:
@@ -100,6 +100,13 @@ def _with(trait: str) -> Sequence[Model]:
 def _predicate(trait: str) -> str:
     any_of = " || ".join(_is("model", each) for each in _with(trait))
     return f"bool model_{trait}(uint model) {{ return {any_of}; }}"
+
+
+def _walk_color() -> str:
+    """`model_walk_color(m)`, for materials whose model walks."""
+    *others, last = _with("walks")
+    rungs = "".join(f"{_is('m.model', model)} ? m.{model.walk_color} : " for model in others)
+    return f"vec3 model_walk_color(Material m) {{ return {rungs}m.{last.walk_color}; }}"
 
 
 def _includes(names: Iterable[str]) -> str:

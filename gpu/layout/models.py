@@ -47,7 +47,9 @@ class Model:
     has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
     has_coat_normals: bool = False  # its coat may have a normal of its own
     covers_emission: bool = False  # its emission lies under its coat and its fuzz
-    walks: bool = False  # light walks under its surface where `subsurface` and `subsurface_radius` are above 0
+    # The member of `layout.Material` with the colour of what is under the surface, where light walks if `subsurface`
+    # and `subsurface_radius` are above 0; empty: light never does.
+    walk_color: str = ""
     has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
     optional: tuple[str, ...] = ()  # members of `layout.Material` that raise a flag where they are above 0
     # What it has besides `layout.Material`, and the member of `SceneArrays` that begins with one for each material.
@@ -60,6 +62,11 @@ class Model:
     def flag(self) -> str:
         """The flag of kernels that know the model."""
         return f"HAS_{self.name.upper()}"
+
+    @property
+    def walks(self) -> bool:
+        """True if light may walk under its surface."""
+        return bool(self.walk_color)
 
     @property
     def lobe_names(self) -> tuple[str, ...]:
@@ -121,7 +128,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
-        walks=True,
+        walk_color="base_color",
         optional=(*_LAYERS, "conductor_eta", "film_thickness"),
     ),
     Model(
@@ -136,7 +143,7 @@ MODELS = (
         has_coat_normals=True,
         covers_emission=True,
         has_members=True,
-        walks=True,
+        walk_color="subsurface_color",
         optional=(
             "subsurface",
             "sheen",

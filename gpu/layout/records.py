@@ -110,7 +110,7 @@ class Material(Record):
     film_weight: f32  # the share of the surface that a thin film covers; 1 for `principled`
     film_thickness: f32  # nm
     film_ior: f32
-    subsurface_color: vec3  # that much of what is under the surface shows; of `principled` it is base_color
+    subsurface_color: vec3  # of what is under the surface, where it is the model's `walk_color`
     subsurface_g: f32  # mean cosine of scattering there
     subsurface_radius: vec3  # mean free path there, m; ABSENT: all light comes back where it enters
     scatter_g: f32  # mean cosine of scattering behind a surface that transmits

@@ -28,7 +28,7 @@ float walk_random(Sampler rng, Path path, uint which) {
 // a constant sky: Hapke's H [1981, "Bidirectional reflectance spectroscopy"] for 1 - H(1) sqrt(1 - albedo), with his
 // similarity for another mean cosine.
 Medium walk_medium(Material m, float least) {
-    vec3 color = clamp(m.model == MODEL_PRINCIPLED ? m.base_color : m.subsurface_color, 0.0, 1.0);
+    vec3 color = clamp(model_walk_color(m), 0.0, 1.0);
     vec3 root = (1.0 - color) / (1.0 + 2.0 * color), alike = 1.0 - root * root;
     Medium r = medium_none();
     r.depth = 1.0;

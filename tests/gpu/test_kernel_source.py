@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from gpu import CompileError, Renderer
+from gpu import CompileError, Renderer, layout
 from gpu.kernels import features, models_glsl, source
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.flag_table import FLAGS
 from gpu.kernels.source import SHADERS, KernelSource
-from gpu.layout.models import FLAGGED, Model
+from gpu.layout.models import FLAGGED, MODELS, WALKING, Model
 from gpu.picture import resolve
 from gpu.picture.look import Look
 
@@ -85,6 +85,21 @@ def test_only_a_models_own_files_ask_for_its_flag(model: Model) -> None:
     own |= set((SHADERS / f"bsdf/lobes/{model.name}").glob("*.glsl"))
     asks = re.compile(rf"\b({model.flag}|{model.lobes_flag})\b")
     assert [path for path in SHADERS.rglob("*.*") if path not in own and asks.search(path.read_text())] == []
+
+
+def test_no_shader_but_a_models_own_names_a_model() -> None:
+    """Numbers of models stand in their folder, and in what `gpu.kernels.models_glsl` writes."""
+    own, names = SHADERS / "bsdf/models", re.compile(r"\bMODEL_(" + "|".join(m.name.upper() for m in MODELS) + r")\b")
+    shaders = [path for path in SHADERS.rglob("*.*") if own not in path.parents]
+    assert len(shaders) > 100 and names.search(models_glsl.text())
+    assert [path for path in shaders if names.search(path.read_text())] == []
+
+
+def test_the_colour_under_a_surface_is_a_member_of_each_model_that_walks() -> None:
+    assert len(WALKING) >= 2 and all(model.walk_color in layout.Material.members for model in WALKING)
+    text = models_glsl.predicates().splitlines()[-1]
+    assert text.startswith("vec3 model_walk_color(Material m)")
+    assert all(f"m.{model.walk_color}" in text for model in WALKING)
 
 
 def test_the_estimator_reads_as_a_page() -> None:
