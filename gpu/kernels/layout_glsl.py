@@ -11,7 +11,7 @@ from gpu.layout.bindings import BlockSlot, GuessSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.pixel_layers import COVER_RANKS
 from gpu.layout.record import Record
-from gpu.tables import energy, film
+from gpu.tables import energy, film, half_space
 
 
 def _struct(record: type[Record]) -> str:
@@ -152,6 +152,8 @@ def constants() -> str:
     out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]
     for name in ("LEAST_ASPECT", "LARGEST_ETA", "AZIMUTH_POWER", "LEAST_SHEEN_ROUGHNESS"):
         out.append(f"const float ENERGY_{name} = {getattr(energy, name)!r};")
+    for name in ("NUMERATOR", "DENOMINATOR"):
+        out.append(f"const vec2 HALF_SPACE_{name} = vec2{getattr(half_space, name)!r};")
     out += [*_film(), f"#define FILM_TEXTURE {bindings.FILM_TEXTURE}"]
     return "\n".join(out)
 

@@ -6,6 +6,7 @@ mip_levels         images -> their mip levels: means of light, of normals with w
 sky                the analytic clear sky and its sun, from the numbers in `hosek_wilkie.txt`
 microfacet         factors of distributions of facets, and the area of facets that a direction sees
 film               what thin films reflect, whatever they lie on
+half_space         the albedo of single scattering by which much of a medium shows a colour
 energy             the energy that microfacet lobes lose, from `energy.npz`, which the folder `build` makes
 build              the offline programs behind `energy.npz`; no other module imports them
 """

@@ -46,7 +46,7 @@ class _Surroundings(Model):
     @model_validator(mode="after")
     def _shines_finitely(self) -> Self:
         if self.medium is not None:
-            extinction, _ = self.medium.coefficients()
+            extinction = self.medium.extinction()
             for i, shines in enumerate(self.medium.emission):
                 if shines > 0 and extinction[i] <= 0:
                     channel = ("red", "green", "blue")[i]

@@ -142,7 +142,7 @@ def _environment(
         sky.cube, sky.sun, sky.sun_share, key="" if key is None else repr(key),
     )  # fmt: skip
     fog = environment.medium
-    if scale <= 0 or (fog is not None and min(fog.coefficients()[0]) > 0):  # nothing comes through all space
+    if scale <= 0 or (fog is not None and min(fog.extinction()) > 0):  # nothing comes through all space
         return _Sky(arrays, warnings=warnings)
     return _Sky(arrays, math.pi * radius**2 * sky.irradiance, scale * sky.peak, warnings)
 

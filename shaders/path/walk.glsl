@@ -2,6 +2,8 @@
 // all directions, as far as the surface lets it out. A walk stays in its shape and passes all others. It counts as one
 // event, and ends after WALK_STEPS steps, which is a bias: docs/price.md has it.
 
+#include "path/half_space.glsl"
+
 #if HAS_WALKS
 const uint WALK_STEPS = 256u;
 
@@ -24,16 +26,12 @@ float walk_random(Sampler rng, Path path, uint which) {
     return float(bits >> 8u) / 16777216.0;
 }
 
-// The medium under the surface. Its albedo of single scattering gives a half space of it the material's colour head-on under
-// a constant sky: Hapke's H [1981, "Bidirectional reflectance spectroscopy"] for 1 - H(1) sqrt(1 - albedo), with his
-// similarity for another mean cosine.
+// The medium under the surface, of which a half space shows the material's colour.
 Medium walk_medium(Material m, float least) {
-    vec3 color = clamp(model_walk_color(m), 0.0, 1.0);
-    vec3 root = (1.0 - color) / (1.0 + 2.0 * color), alike = 1.0 - root * root;
     Medium r = medium_none();
     r.depth = 1.0;
     r.rate = 1.0 / max(m.subsurface_radius, vec3(least));
-    r.scattering = r.rate * alike / (1.0 - m.subsurface_g + m.subsurface_g * alike);
+    r.scattering = r.rate * half_space_albedo(clamp(model_walk_color(m), 0.0, 1.0), m.subsurface_g);
     r.forward = m.subsurface_g * dot(r.scattering, vec3(1.0 / 3.0));
     return r;
 }

@@ -36,10 +36,11 @@ NO_GLOSS = {"principled": {"specular": 0}, "openpbr": {"specular_weight": 0}}
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("color", seldom([0.2, 0.5, 0.8], [0.5]))
 def test_half_spaces_show_the_colour(gpu: Renderer, model: str, color: float) -> None:
-    """Of radii that differ by channel, too; by one event, as a walk counts."""
+    """Of radii that differ by channel, too; by one event, as a walk counts. As walks end after so many steps, light
+    colours lack less than a hundredth."""
     material = MODELS[model](color, **NO_GLOSS[model])
     image = render(gpu, document(HALF_SPACE, {"m": material}, camera=CAMERA, **WHITE), 256, width=16, height=16)
-    np.testing.assert_allclose(image[..., :3].mean((0, 1)), color, atol=0.03)
+    np.testing.assert_allclose(image[..., :3].mean((0, 1)), color, atol=0.004 if color < 0.8 else 0.01)
 
 
 @pytest.mark.parametrize("g", [-0.5, 0.7])

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
+from gpu.tables import half_space
 from service.document.medium import Medium
+from service.pack.geometry.shape_records import scattering
 from tests.web.editing import document
 from tests.web.editor import Editor
 from tests.web.modules import call
@@ -75,16 +77,23 @@ def test_space_is_filled_and_panels_are_not(editor: Editor) -> None:
     assert kind.is_hidden()
 
 
+def test_the_colour_of_much_is_the_server_s(page: Page) -> None:
+    for color in (0.0, 0.01, 0.3, 0.8, 0.999, 1.0):
+        found = call(page, "document/medium.js", "rootOf", color)
+        assert found == pytest.approx(float(half_space.root(np.array(color))), abs=1e-12)
+
+
 def test_both_descriptions_agree_with_the_server(page: Page) -> None:
     for g in (-0.5, 0.0, 0.7):
         look = {"albedo": [0.9, 0.5, 0.1], "radius": [0.5, 0.25, 2.0], "g": g}
         turned = call(page, "document/medium.js", "turned", look, "coefficients", SCENE, None)
-        extinction, scattering = Medium.model_validate(look).coefficients()
+        medium = Medium.model_validate(look)
+        extinction = medium.extinction()
         assert np.add(turned["absorption"], turned["scattering"]) == pytest.approx(np.array(extinction), rel=0.01)
         shares = np.divide(turned["scattering"], extinction)
-        assert shares == pytest.approx(np.divide(scattering, extinction), abs=0.02)
+        assert shares == pytest.approx(np.divide(scattering(medium), extinction), abs=0.005)
         back = call(page, "document/medium.js", "turned", turned, "look", SCENE, None)
-        assert back["albedo"] == pytest.approx(look["albedo"], abs=0.01)
+        assert back["albedo"] == pytest.approx(look["albedo"], abs=0.003)
         assert back["radius"] == pytest.approx(look["radius"], rel=0.01)
     clear = call(page, "document/medium.js", "turned", {"absorption": [1, 0, 0]}, "look", SCENE, None)
     Medium.model_validate(clear)

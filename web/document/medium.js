@@ -17,7 +17,24 @@ const round = (value) => Number(value.toPrecision(3));
 const alike = (albedo, g) => (albedo * (1 - g)) / (1 - albedo * g);
 const unlike = (albedo, g) => albedo / (1 - g + g * albedo);
 
-// What a half space shows, by Hapke's H(1) = 3 / (1 + 2 root): within .01 of what the server has for a colour.
+// sqrt(1 - albedo of single scattering) of what shows a colour, where all directions are alike: the server's fraction
+// (gpu/tables/half_space.py); a test compares them.
+export const rootOf = (shown) => {
+  const over = 1 + shown * (1.559855 + shown * 0.061367);
+  return ((1 - shown) * over) / (1 + shown * (3.818356 + shown * 2.803097));
+};
+
+// The colour by its root, by halving.
+const shownBy = (root) => {
+  let [low, high] = [0, 1];
+  for (let i = 0; i < 40; i++) {
+    const middle = (low + high) / 2;
+    if (rootOf(middle) > root) low = middle;
+    else high = middle;
+  }
+  return low; // 0 for the root of black
+};
+
 function look({ absorption = 0, scattering = 0, g = 0, ...others }) {
   const [a, s] = [linear(absorption), linear(scattering)];
   const total = a.map((x, i) => x + s[i]);
@@ -25,13 +42,13 @@ function look({ absorption = 0, scattering = 0, g = 0, ...others }) {
   return {
     ...others,
     g,
-    albedo: roots.map((root) => round((1 - root) / (1 + 2 * root))),
+    albedo: roots.map((root) => round(shownBy(root))),
     radius: total.map((x) => (x > 0 ? round(1 / x) : FARTHEST)),
   };
 }
 
 function coefficients({ albedo, radius, g = 0, ...others }) {
-  const shares = linear(albedo).map((shown) => unlike(1 - ((1 - shown) / (1 + 2 * shown)) ** 2, g));
+  const shares = linear(albedo).map((shown) => unlike(1 - rootOf(shown) ** 2, g));
   const totals = linear(radius).map((r) => 1 / r);
   return {
     ...others,

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import Body, ShapeKind, ShapeSpace
+from gpu.tables.half_space import single_scattering_albedo
 from service.document import Scene
 from service.document.medium import LARGEST_G, Medium
 from service.document.numbers import Vec3
@@ -120,6 +121,13 @@ def odd_media(scene: Scene, materials: np.ndarray, odd: Iterable[OddMesh]) -> tu
     return counted(found)
 
 
+def scattering(medium: Medium) -> np.ndarray:
+    """The rate at which light turns, 1/m per channel (3,)."""
+    if medium.albedo is None:
+        return np.array(medium.scattering)
+    return np.array(medium.extinction()) * single_scattering_albedo(np.array(medium.albedo), medium.g)
+
+
 def _fill(record: np.void, medium: Medium) -> None:
-    record["extinction"], record["scattering"] = medium.coefficients()
+    record["extinction"], record["scattering"] = medium.extinction(), scattering(medium)
     record["g"], record["emission"] = np.clip(medium.g, -LARGEST_G, LARGEST_G), medium.emission
