@@ -43,8 +43,9 @@ def defines(textures: TextureArrays | None) -> dict[str, object]:
     surface = [slot for name, slot in slots.items() if name not in APART]
     out["ANY_FOOTPRINTS"] = int(any(name not in POINTWISE for name in slots))
     flags = np.bitwise_or.reduce(records(textures)[0]["flags"], axis=None) if textures is not None and slots else 0
-    out["ANY_CLAMPED"] = int(flags & texture_records.SLOT_CLAMP > 0)
-    out["ANY_MIRRORED"] = int(flags & texture_records.SLOT_MIRROR > 0)
+    wraps = flags | flags >> texture_records.SLOT_V_SHIFT
+    out["ANY_CLAMPED"] = int(wraps & texture_records.SLOT_CLAMP > 0)
+    out["ANY_MIRRORED"] = int(wraps & texture_records.SLOT_MIRROR > 0)
     out["BODIES_TEXTURED"] = int(any(name in slots for name in OF_BODIES))
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = out["TEXTURE_SURFACE_LOOP"] = max(surface, default=-1) + 1

@@ -10,8 +10,11 @@ import math
 
 from gpu.layout.record import Record, f32, u32, vec3, vec4
 
-SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
-SLOT_NORMALS, SLOT_LEVELS = 1 << 6, 1 << 7  # an image of normals, and one with mip levels
+# How an image wraps along u, and SLOT_V_SHIFT bits further along v; with neither it repeats.
+SLOT_CLAMP, SLOT_MIRROR, SLOT_V_SHIFT = 1, 2, 2
+SLOT_WRAPS = SLOT_CLAMP | SLOT_MIRROR
+SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(4, 8))
+SLOT_NORMALS, SLOT_LEVELS = 1 << 19, 1 << 20  # an image of normals, and one with mip levels
 # Of slots that have a recipe: noise, solid or not, with creases or not; coordinates as colours; and a ramp over these
 # or over an image or a checker. The number of the recipe, that of the slot, stands above them.
 SLOT_NOISE, SLOT_SOLID, SLOT_TURBULENCE, SLOT_COORDINATES = (1 << i for i in range(8, 12))

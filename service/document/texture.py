@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
 
@@ -37,6 +37,32 @@ def _pair(value: Any) -> Vec2:
 
 Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(vector_schema(size=2))]
 
+WrapMode = Literal["repeat", "clamp", "mirror"]
+WRAPS: tuple[WrapMode, ...] = get_args(WrapMode)
+_MODES = {"type": "string", "enum": list(WRAPS)}
+
+
+def _wrap(value: Any) -> WrapMode | tuple[WrapMode, WrapMode]:
+    if not isinstance(value, list | tuple):
+        return _mode(value)
+    if len(value) != 2:
+        raise refusal(f"must be one word, or two for u and v, not {len(value)}")
+    return _mode(value[0], "/0"), _mode(value[1], "/1")
+
+
+def _mode(value: Any, at: str = "") -> WrapMode:
+    for mode in WRAPS:
+        if value == mode:
+            return mode
+    raise refusal(f"must be 'repeat', 'clamp' or 'mirror', not {described(value)}", at)
+
+
+Wrap = Annotated[
+    WrapMode | tuple[WrapMode, WrapMode],
+    PlainValidator(_wrap),
+    WithJsonSchema({"anyOf": [_MODES, {"type": "array", "items": _MODES, "minItems": 2, "maxItems": 2}]}),
+]
+
 Mapping = Annotated[
     Literal["uv", "box", "sphere"],
     hint(
@@ -55,9 +81,9 @@ class ImageTexture(Model):
         OMITTABLE,
         hint("Colour space", "Without it 8-bit images in colours are sRGB, all others linear; alpha always is."),
     ] = None
-    wrap: Annotated[
-        Literal["repeat", "clamp", "mirror"], hint("Wrap", "What lies outside of the image, in both directions.")
-    ] = "repeat"
+    wrap: Annotated[Wrap, hint("Wrap", "What lies outside of the image: one word, or one for u and one for v.")] = (
+        "repeat"
+    )
     mapping: Mapping = "uv"
     scale: Annotated[
         Pair, hint("Scale", "Factors on u and v, applied first: 2 shows the image twice.", unit="", widget="number")
@@ -77,6 +103,11 @@ class ImageTexture(Model):
         int, Field(ge=0, le=1),
         hint("UV set", "Of a mesh's two sets of coordinates.", unit="", widget="number", used=("mapping", ["uv"])),
     ] = 0  # fmt: skip
+
+    @property
+    def wraps(self) -> tuple[WrapMode, WrapMode]:
+        """The modes along u and along v."""
+        return (self.wrap, self.wrap) if isinstance(self.wrap, str) else self.wrap
 
     @model_validator(mode="after")
     def _reads_what_it_names(self) -> Self:

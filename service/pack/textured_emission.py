@@ -9,6 +9,7 @@ import numpy as np
 from gpu.layout import LightKind, ShapeKind, texture_records
 from service.document.texture import CheckerTexture, ImageTexture, is_projected
 from service.pack.geometry.geometry import Geometry
+from service.pack.textures.heights import wrapped
 from service.pack.textures.images import PackedTexels
 from service.pack.textures.recipes import listed
 from service.pack.textures.uses import TextureReference
@@ -101,10 +102,7 @@ def nearest(use: TextureReference, texels: PackedTexels, uv: np.ndarray) -> np.n
         return np.where(odd[:, None], use.texture.b, use.texture.a).astype(np.float32)
     assert isinstance(use.texture, ImageTexture)
     pixels = texels.places[use.key][1].pixels
-    if use.texture.wrap == "repeat":
-        uv = uv - np.floor(uv)
-    elif use.texture.wrap == "mirror":
-        uv = 1 - np.abs(uv - 2 * np.floor(uv / 2) - 1)
+    uv = np.stack([wrapped(x, wrap) for x, wrap in zip(uv.T, use.texture.wraps, strict=True)], axis=1)
     size = np.array(pixels.shape[1::-1])
     x, y = np.clip((uv * size).astype(np.int64), 0, size - 1).T
     return np.asarray(pixels[size[1] - 1 - y, x])

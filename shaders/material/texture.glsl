@@ -43,28 +43,28 @@ vec4 texture_texel(TextureSlot s, uint at) {
     return c;
 }
 
-// A coordinate as the texture repeats it, 0..1.
-float texture_once(float x, uint flags) {
+// A coordinate as the texture wraps it, 0..1. `wrap` has the bits of u; those of v are shifted down to them.
+float texture_once(float x, uint wrap) {
     float once = fract(x);
 #if ANY_MIRRORED
     float folded = x - 2.0 * floor(0.5 * x);
-    if ((flags & TEXTURE_SLOT_MIRROR) != 0u) once = min(folded, 2.0 - folded);
+    if ((wrap & TEXTURE_SLOT_MIRROR) != 0u) once = min(folded, 2.0 - folded);
 #endif
 #if ANY_CLAMPED
-    if ((flags & TEXTURE_SLOT_CLAMP) != 0u) once = clamp(x, 0.0, 1.0);
+    if ((wrap & TEXTURE_SLOT_CLAMP) != 0u) once = clamp(x, 0.0, 1.0);
 #endif
     return once;
 }
 
 // One axis: the two texels around x and the share of the second. x is 0..1, or anything where the texture repeats.
-void texture_axis(float x, uint n, uint flags, out int a, out int b, out float share) {
-    float t = texture_once(x, flags) * float(n) - 0.5, low = floor(t);
+void texture_axis(float x, uint n, uint wrap, out int a, out int b, out float share) {
+    float t = texture_once(x, wrap) * float(n) - 0.5, low = floor(t);
     int last = int(n) - 1;
     share = t - low;
     a = int(low);
     b = a + 1;
     // The border texel of a mirrored image is its own neighbour.
-    bool stays = (ANY_CLAMPED != 0 || ANY_MIRRORED != 0) && (flags & (TEXTURE_SLOT_CLAMP | TEXTURE_SLOT_MIRROR)) != 0u;
+    bool stays = (ANY_CLAMPED != 0 || ANY_MIRRORED != 0) && (wrap & TEXTURE_SLOT_WRAPS) != 0u;
     if (a < 0) a = stays ? 0 : last;
     if (b > last) b = stays ? last : 0;
 }
@@ -107,7 +107,7 @@ void texture_taps(TextureSlot s, vec2 uv, mat2 spread, inout uint first, inout u
         for (int k = 0; k < 4; k++) {
             vec2 p = uv + (square ? float(2 * (k & 1) - 1) * by + float((k & 2) - 1) * aside
                                   : (float(k) - 1.5) * by);
-            vec2 once = vec2(texture_once(p.x, s.flags), texture_once(p.y, s.flags));
+            vec2 once = vec2(texture_once(p.x, s.flags), texture_once(p.y, s.flags >> TEXTURE_SLOT_V_SHIFT));
             at[k] = min(ivec2(once * vec2(n)), n - 1);
             at[k].y = n.y - 1 - at[k].y;
         }
@@ -122,7 +122,7 @@ vec4 texture_image(TextureSlot s, vec2 uv, mat2 spread) {
     int x0, x1, y0, y1;
     vec2 share;
     texture_axis(uv.x, s.width, s.flags, x0, x1, share.x);
-    texture_axis(uv.y, s.height, s.flags, y0, y1, share.y); // counted from below
+    texture_axis(uv.y, s.height, s.flags >> TEXTURE_SLOT_V_SHIFT, y0, y1, share.y); // counted from below
     int top = int(s.height) - 1;
     ivec2 at[4] = ivec2[4](ivec2(x0, top - y0), ivec2(x1, top - y0), ivec2(x0, top - y1), ivec2(x1, top - y1));
     uint first = s.first, width = s.width;

@@ -60,12 +60,13 @@ def expected(texture: dict[str, Any], reference: dict[str, Any], uv: np.ndarray)
     height, width = pixels.shape[:2]
     x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
     wrap, out = texture.get("wrap", "repeat"), 0.0
-    if wrap == "clamp":
-        x, y = np.clip(x, -0.5, width - 0.5), np.clip(y, -0.5, height - 0.5)
+    across, down = (wrap, wrap) if isinstance(wrap, str) else wrap
+    x = np.clip(x, -0.5, width - 0.5) if across == "clamp" else x
+    y = np.clip(y, -0.5, height - 0.5) if down == "clamp" else y
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     for a, b in itertools.product((0, 1), (0, 1)):
         weight = (x - i if a else 1 - x + i) * (y - j if b else 1 - y + j)
-        texel = pixels[wrapped(j + b, height, wrap), wrapped(i + a, width, wrap)]
+        texel = pixels[wrapped(j + b, height, down), wrapped(i + a, width, across)]
         out = out + weight[:, None] * texel
     out = np.asarray(out)
     if "channel" in reference:
@@ -78,8 +79,11 @@ def scene_of(textures: Doc, material: Doc, *shapes: Doc, **more: Any) -> Doc:
     return document(list(shapes or [QUAD]), {"m": m}, textures=textures, camera=LOOK, **more)
 
 
+WRAPS = ("repeat", "clamp", "mirror")
 TEXTURES: list[dict[str, Any]] = [
-    *({"wrap": wrap, "asset": asset} for wrap in ("repeat", "clamp", "mirror") for asset in IMAGES),
+    *({"wrap": wrap, "asset": asset} for wrap in WRAPS for asset in IMAGES),
+    *({"wrap": list(pair), "asset": "rgb"} for pair in itertools.permutations(WRAPS, 2)),
+    {"asset": "rgba", "rotation": 30, "scale": [2, -3], "offset": [0.3, -5.7], "wrap": ["mirror", "clamp"]},
     {"asset": "rgb", "color_space": "linear"},
     {"asset": "floats", "color_space": "linear", "rotation": 90},
     {"asset": "floats", "color_space": "srgb"},

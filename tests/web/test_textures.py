@@ -38,7 +38,9 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     page.click(f"{BENEATH} [data-field=channel] .reset")
     editor.wait("its colours", lambda: not editor.differs(before, 6))
 
-    page.select_option(f"{BENEATH} [data-field=wrap] select", "mirror")
+    wraps = [page.locator(f"{BENEATH} [data-field=wrap] [aria-label='Wrap, {axis}']") for axis in "UV"]
+    wraps[0].select_option("mirror")
+    wraps[1].select_option("clamp")
     page.select_option(f"{BENEATH} [data-field=color_space] select", "linear")
     turn = page.locator(f"{BENEATH} [data-field=rotation] input.number")
     turn.fill("30")
@@ -55,14 +57,17 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     document = json.loads(editor.shot("#download-scene"))
     assert document["materials"]["Red paint"]["base_color"] == {"texture": "halves", "factor": [0.5, 0.5, 0.5]}
     lies = {key: value for key, value in document["textures"]["halves"].items() if key != "asset"}
-    assert lies == {"wrap": "mirror", "color_space": "linear", "rotation": 30, "scale": [3, 1]}
+    assert lies == {"wrap": ["mirror", "clamp"], "color_space": "linear", "rotation": 30, "scale": [3, 1]}
 
     editor.tab("material")
     page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: page.is_hidden(BENEATH) and page.is_hidden("[data-field=base_color] .texture"))
     page.keyboard.press("Control+z")
     editor.wait("the texture again", lambda: page.is_visible(f"{BENEATH} [data-field=wrap]"))
-    assert page.input_value(f"{BENEATH} [data-field=wrap] select") == "mirror"
+    assert [one.input_value() for one in wraps] == ["mirror", "clamp"]
+    wraps[0].select_option("clamp")
+    editor.settled()
+    assert json.loads(editor.shot("#download-scene"))["textures"]["halves"]["wrap"] == "clamp"
 
 
 @pytest.mark.slow

@@ -34,6 +34,28 @@ function choice(field, id, { input, commit }) {
   };
 }
 
+// Words for u and v; one word stands for both, in the document and where both are the same.
+function choices(field, id, { input, commit }) {
+  let latest = [];
+  const selects = ["U", "V"].map((axis, i) => {
+    const write = (word) => {
+      latest = latest.map((old, k) => (k === i ? word : old));
+      input(latest[0] === latest[1] ? word : latest);
+    };
+    const one = choice({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, { input: write, commit });
+    one.element.setAttribute("aria-label", `${field.title}, ${axis}`);
+    const letter = element("i", { "aria-hidden": "true" }, axis);
+    return { ...one, axis: element("span", { class: "axis", "data-axis": axis }, letter, one.element) };
+  });
+  return {
+    element: element("div", { class: "vector" }, ...selects.map(({ axis }) => axis)),
+    show(value) {
+      latest = Array.isArray(value) ? value : [value, value];
+      selects.forEach((one, i) => one.show(latest[i]));
+    },
+  };
+}
+
 function toggle(field, id, { input, commit }) {
   const box = element("input", {
     type: "checkbox",
@@ -248,6 +270,7 @@ export function control(field, id, events) {
   if (field.widget === "vector") return vector(field, id, events);
   if (field.widget === "texture") return { element: element("span", { id }), show() {} }; // its slot is all there is
   if (field.widget === "file") return fileEntry(id, events);
+  if (field.widget === "choices") return choices(field, id, events);
   if (field.widget === "choice") return choice(field, id, events);
   if (field.widget === "toggle") return toggle(field, id, events);
   if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events, "wide");

@@ -92,6 +92,7 @@ function field(schema, name, raw, required) {
   const whole = !options.some((node) => node.type === "number");
   const limits = [top, ...(numeric ? [numeric] : [])];
   const choices = bound(nodes, "enum");
+  const pair = choices && options.find((node) => node.type === "array" && node.maxItems === 2 && node.items?.enum);
   const open = { min: bound(limits, "exclusiveMinimum"), max: bound(limits, "exclusiveMaximum") };
   const min = bound(limits, "minimum") ?? open.min;
   const max = bound(limits, "maximum") ?? open.max;
@@ -102,7 +103,7 @@ function field(schema, name, raw, required) {
     : vector
       ? "vector"
       : choices
-        ? "choice"
+        ? (pair && "choices") || "choice"
         : options.some((node) => node.type === "boolean")
           ? "toggle"
           : numeric

@@ -365,8 +365,8 @@ class ImageTexture(TypedDict, total=False):
     """PNG, JPEG, WebP, EXR or Radiance HDR."""
     color_space: Literal["srgb", "linear"]
     """Without it 8-bit images in colours are sRGB, all others linear; alpha always is."""
-    wrap: Literal["repeat", "clamp", "mirror"]
-    """What lies outside of the image, in both directions. (default 'repeat')"""
+    wrap: Literal["repeat", "clamp", "mirror"] | list[Literal["repeat", "clamp", "mirror"]]
+    """What lies outside of the image: one word, or one for u and one for v. (default 'repeat')"""
     mapping: Literal["uv", "box", "sphere"]
     """By the shape's texture coordinates, or, without those: box, once a metre; sphere, once around the middle.
     (default 'uv')"""

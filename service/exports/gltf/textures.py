@@ -53,7 +53,7 @@ class Textures:
     limits: Limits
     losses: Losses
     _images: dict[Any, int] = field(default_factory=dict)
-    _samplers: dict[str, int] = field(default_factory=dict)
+    _samplers: dict[tuple[str, str], int] = field(default_factory=dict)
     _textures: dict[tuple[int, int], int] = field(default_factory=dict)
     _pixels: dict[str, ImageData] = field(default_factory=dict)
     _texels: int = 0  # of computed images
@@ -69,12 +69,12 @@ class Textures:
         image = self._original(planes, is_srgb)
         if image is None:
             image = self._computed(planes, is_srgb)
-        wrap = placing.wrap if isinstance(placing, ImageTexture) else "repeat"
-        if wrap not in self._samplers:
-            mode = WRAPS[wrap]
-            sampler = {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": mode, "wrapT": mode}
-            self._samplers[wrap] = self.builder.add("samplers", sampler)
-        key = image, self._samplers[wrap]
+        wraps = placing.wraps if isinstance(placing, ImageTexture) else ("repeat", "repeat")
+        if wraps not in self._samplers:
+            u, v = (WRAPS[wrap] for wrap in wraps)
+            sampler = {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": u, "wrapT": v}
+            self._samplers[wraps] = self.builder.add("samplers", sampler)
+        key = image, self._samplers[wraps]
         if key not in self._textures:
             texture = {"sampler": key[1], "source": image, "name": first.texture}
             self._textures[key] = self.builder.add("textures", texture)

@@ -206,9 +206,9 @@ class Graph:
         if texture.mapping == "sphere":
             self.tell(parameter, "an image by sphere is written by texture coordinates")
         inputs = [f'<input name="file" type="filename" value="{path}"{colorspace} />', self._placed(texture)]
-        if texture.wrap != "repeat":
-            mode = WRAPS[texture.wrap]
-            inputs += [f'<input name="{axis}addressmode" type="string" value="{mode}" />' for axis in "uv"]
+        for axis, wrap in zip("uv", texture.wraps, strict=True):
+            if texture.wraps != ("repeat", "repeat"):
+                inputs.append(f'<input name="{axis}addressmode" type="string" value="{WRAPS[wrap]}" />')
         return self._node("image", type, *inputs)
 
     def _projected(self, texture: ImageTexture, parameter: str, type: str, file: str) -> str:
@@ -216,7 +216,7 @@ class Graph:
         self.tell(parameter, "MaterialX shows an image by box mirrored on three of its six sides")
         if texture.scale[0] != texture.scale[1] or texture.rotation or texture.offset != (0, 0):
             self.tell(parameter, "an image by box keeps its scale along u alone, without rotation and offset")
-        if texture.wrap != "repeat":
+        if texture.wraps != ("repeat", "repeat"):
             self.tell(parameter, "an image by box repeats in MaterialX")
         inputs = [f'<input name="file{axis}" {file} />' for axis in "xyz"]
         if texture.scale[0] != 1:

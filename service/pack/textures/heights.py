@@ -57,8 +57,8 @@ class HeightField:
         c, s = math.cos(angle), math.sin(angle)
         channel, is_srgb = self._image
         height, width = channel.shape
-        x0, x1, x = _axis(c * u - s * v + texture.offset[0], width, texture.wrap)
-        y0, y1, y = _axis(s * u + c * v + texture.offset[1], height, texture.wrap)
+        x0, x1, x = _axis(c * u - s * v + texture.offset[0], width, texture.wraps[0])
+        y0, y1, y = _axis(s * u + c * v + texture.offset[1], height, texture.wraps[1])
 
         def row(k: np.ndarray) -> np.ndarray:
             a, b = (_decoded(channel[height - 1 - k, at], is_srgb) for at in (x0, x1))
@@ -71,15 +71,18 @@ class HeightField:
         return (*color, 1.0)["rgba".index(self.reference.channel)]
 
 
+def wrapped(x: np.ndarray, wrap: str) -> np.ndarray:
+    """Coordinates along one axis as a texture wraps them, 0..1."""
+    if wrap == "clamp":
+        return np.asarray(np.clip(x, 0.0, 1.0))
+    if wrap == "mirror":
+        return np.asarray(1 - np.abs(x - 2 * np.floor(x / 2) - 1))
+    return np.asarray(x - np.floor(x))
+
+
 def _axis(x: np.ndarray, n: int, wrap: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The two texels around x, and the share of the second, as `texture_axis` has them."""
-    if wrap == "clamp":
-        x = np.clip(x, 0.0, 1.0)
-    elif wrap == "mirror":
-        x = 1 - np.abs(x - 2 * np.floor(x / 2) - 1)
-    else:
-        x = x - np.floor(x)
-    t = x * n - 0.5
+    t = wrapped(x, wrap) * n - 0.5
     low = np.floor(t)
     first = low.astype(np.int64)
     if wrap == "repeat":

@@ -32,6 +32,7 @@ from service.pack.textures.uses import TextureReference, check_channels, sampled
 from service.problems import escaped
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
+WRAPS = {"repeat": 0, "clamp": texture_records.SLOT_CLAMP, "mirror": texture_records.SLOT_MIRROR}
 
 
 def pack_textures(
@@ -124,7 +125,8 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
     first, image = texels.places[use.key]
-    flags = {"repeat": 0, "clamp": texture_records.SLOT_CLAMP, "mirror": texture_records.SLOT_MIRROR}[texture.wrap]
+    u, v = (WRAPS[wrap] for wrap in texture.wraps)
+    flags = u | v << texture_records.SLOT_V_SHIFT
     flags |= texture_records.SLOT_SRGB if use.srgb else 0
     flags |= 0 if image.is_8bit else texture_records.SLOT_FLOATS
     flags |= texture_records.SLOT_UV_1 if texture.uv == 1 else 0

@@ -96,7 +96,7 @@ def assert_same_arrays(one: dict[str, Any], other: dict[str, Any], store: AssetS
 
 def textured(store: AssetStore) -> dict[str, Any]:
     color, data = (store.add(png(each)).id for each in (COLOR, DATA))
-    placed = {"scale": [2, 0.75], "rotation": 30, "offset": [0.25, 0.1], "wrap": "mirror"}
+    placed = {"scale": [2, 0.75], "rotation": 30, "offset": [0.25, 0.1], "wrap": ["mirror", "clamp"]}
     material = {
         "type": "principled",
         "base_color": {"texture": "color", "factor": [0.9, 0.8, 0.7]},

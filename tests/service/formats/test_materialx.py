@@ -99,7 +99,7 @@ def test_an_image_times_a_constant_stays_as_it_is(store: AssetStore) -> None:
         node("place2d", "turned", "vector2", wire("texcoord", "tc", "vector2"), value("scale", "0.5, 0.5", "vector2"),
              value("rotate", 30.0), value("offset", "0.25, 0", "vector2")),
         node("image", "own", "color3", value("file", "maps/a.png", "filename", colorspace="srgb_texture"),
-             wire("texcoord", "turned", "vector2"), value("uaddressmode", "mirror"), value("vaddressmode", "mirror")),
+             wire("texcoord", "turned", "vector2"), value("uaddressmode", "mirror"), value("vaddressmode", "clamp")),
         node("multiply", "dark", "color3", wire("in1", "own"), value("in2", [0.5, 0.25, 1])),
         node("tiledimage", "orm", "vector3", value("file", "maps/a.png", "filename"),
              value("uvtiling", "2, 3", "vector2"),
@@ -127,7 +127,7 @@ def test_an_image_times_a_constant_stays_as_it_is(store: AssetStore) -> None:
     }
     textures = imported.document["textures"]
     # place2d turns clockwise, and takes its offset last.
-    assert textures["a"]["color_space"] == "srgb" and textures["a"]["wrap"] == "mirror"
+    assert textures["a"]["color_space"] == "srgb" and textures["a"]["wrap"] == ["mirror", "clamp"]
     placing = [textures["a"][name] for name in ("scale", "rotation", "offset")]
     assert placing == [[2, 2], pytest.approx(-30), pytest.approx([-0.25, 0])]
     assert textures["a 2"]["color_space"] == "linear"

@@ -51,6 +51,35 @@ def test_nothing_outside_of_the_upload_is_opened(store: AssetStore, tmp_path: Pa
 
 
 @pytest.mark.usd
+@pytest.mark.parametrize("path", ["/etc/passwd", "file:///etc/passwd", "foo", "foo.bin", "missing.usda", "../x.usda",
+                                  "http://127.0.0.1:9/x", "x.abc", "x.obj"])  # fmt: skip
+@pytest.mark.parametrize("arc", ["references", "payload", "prepend references", "subLayers"])
+def test_what_a_layer_refers_to_and_is_not_there_is_told(store: AssetStore, path: str, arc: str) -> None:
+    """By whatever suffix, alone and in a package; once for each place."""
+    head = f"metersPerUnit = 1\n    subLayers = [@{path}@]" if arc == "subLayers" else "metersPerUnit = 1"
+    other = "" if arc == "subLayers" else f'def "P" (\n {arc} = @{path}@\n)\n{{\n}}\n'
+    root = usda(other + mesh("Own"), head)
+    for data in (root, usdz({"a.usda": root})):
+        found = store.scene(store.add(data).id)
+        assert [shape["name"] for shape in found.document["shapes"]] == ["Own"]
+        (told,) = found.warnings
+        assert path in told["detail"] and "left out" in told["detail"]
+
+
+@pytest.mark.usd
+def test_layers_are_known_by_their_bytes_and_other_files_are_told(store: AssetStore) -> None:
+    def of(path: str) -> bytes:
+        return usda(f'def "P" (\n references = @{path}@</Door>\n)\n{{\n}}\n' + mesh("Own"))
+
+    door = {"parts/door": usda(mesh("Door")), "a.png": PNG(np.zeros((1, 1, 3), np.uint8))}
+    found = store.scene(store.add(usdz({"a.usda": of("parts/door"), **door})).id)
+    assert {shape["name"] for shape in found.document["shapes"]} == {"Own", "P"} and not found.warnings
+    found = store.scene(store.add(usdz({"a.usda": of("a.png"), **door})).id)
+    (told,) = found.warnings
+    assert "'a.png'" in told["detail"] and "no USD layer" in told["detail"]
+
+
+@pytest.mark.usd
 @pytest.mark.slow
 def test_packages_that_lead_out_or_blow_up_are_refused(store: AssetStore) -> None:
     from service.formats.read.usd.importer import read_scene

@@ -76,7 +76,7 @@ def test_textures_keep_their_channels_wraps_transforms_and_spaces(store: AssetSt
     """
     more = """
         token inputs:wrapS = "mirror"
-        token inputs:wrapT = "mirror"
+        token inputs:wrapT = "repeat"
         float4 inputs:scale = (0.5, 0.25, 1, 1)
     """
     turn = """
@@ -95,9 +95,32 @@ def test_textures_keep_their_channels_wraps_transforms_and_spaces(store: AssetSt
     assert found["base_color"] == {"texture": "a", "factor": [0.5, 0.25, 1]}
     assert found["roughness"] == {"texture": "a", "channel": "g", "factor": 0.25}
     assert scene.document["textures"]["a"] | {"asset": ""} == {
-        "asset": "", "color_space": "srgb", "wrap": "mirror", "scale": [2, 3], "rotation": 90, "offset": [0.5, 0],
+        "asset": "", "color_space": "srgb", "wrap": ["mirror", "repeat"], "scale": [2, 3], "rotation": 90,
+        "offset": [0.5, 0],
     }  # fmt: skip
     assert [warning["pointer"] for warning in scene.warnings] == ["/Look/S.inputs:occlusion"]
+
+
+@pytest.mark.parametrize(("given", "reach", "wrap", "told"), [
+    ('wrapS = "black"', (3, 1), ["clamp", "clamp"], ["wrapS"]),
+    ('wrapT = "useMetadata"', (1, 3), ["clamp", "clamp"], ["wrapT"]),
+    ('wrapT = "mirror"', (1, 3), ["clamp", "mirror"], []),
+    ('wrapS = "black"', (1, 1), ["clamp", "clamp"], []),
+    ("", (3, 3), ["clamp", "clamp"], ["wrapS"]),  # and wrapT: one warning of two places
+    ('wrapS = "repeat"', (3, 3), ["repeat", "clamp"], ["wrapT"]),
+])  # fmt: skip
+def test_what_lies_beyond_an_image_is_told_where_it_is_seen(
+    store: AssetStore, given: str, reach: tuple[int, int], wrap: list[str], told: list[str]
+) -> None:
+    """An image without a wrap is black there, as one with metadata that it does not have."""
+    read = "color3f inputs:diffuseColor.connect = </Look/T.outputs:rgb>"
+    nodes = texture("Look", "a.png", f"token inputs:{given}" if given else "")
+    chart = UV.replace("(1, 0)", f"({reach[0]}, 0)").replace("(0, 1)]", f"(0, {reach[1]})]", 1)
+    root = usda(material("Look", read, nodes) + mesh("Sign", "rel material:binding = </Look>", body=QUAD + chart))
+    found = store.scene(store.add(usdz({"root.usda": root, "a.png": PNG(CHANNELS)})).id)
+    (document,) = found.document["textures"].values()
+    assert document["wrap"] == (wrap[0] if wrap[0] == wrap[1] else wrap)
+    assert [warning["pointer"] for warning in found.warnings] == [f"/Look/T.inputs:{name}" for name in told]
 
 
 @pytest.mark.parametrize(("space", "pixels", "shown"), [

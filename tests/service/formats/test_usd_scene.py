@@ -102,10 +102,39 @@ def test_subsets_have_their_own_materials_and_left_handed_faces_are_turned(store
     assert found.document["materials"]["Blue"]["base_color"] == [0, 0, 1]
 
 
+TENT = "[(-1, -1, 0), (1, -1, 0), (1, 1, 1), (-1, 1, 0)]"
+
+
 def test_cages_are_smooth_and_said_to_be_cages(store: AssetStore) -> None:
-    found = imported(store, usda(mesh("Cage", body=QUAD.replace('"none"', '"catmullClark"'))))
+    bent = QUAD.replace("[(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]", TENT)
+    found = imported(store, usda(mesh("Cage", body=bent.replace('"none"', '"catmullClark"'))))
     assert "smooth" not in found.document["shapes"][0] and "cage" in found.warnings[0]["detail"]
     assert store.mesh(found.document["shapes"][0]["asset"]).normals is not None
+    assert not imported(store, usda(mesh("Floor", body=QUAD.replace('"none"', '"catmullClark"')))).warnings
+
+
+def test_subdivision_changes_what_is_bent_and_no_flat_floor() -> None:
+    from service.formats.read.usd.subdivision import bends
+
+    def grid(z: list[float], turned: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Two by two squares, the point on the right of the middle row moved to a side."""
+        points = np.array([[x, y, z[3 * y + x]] for y in range(3) for x in range(3)], float) * 50 + 1e4
+        points[5, 0] += turned
+        faces = [[k, k + 1, k + 4, k + 3] for k in (0, 1, 3, 4)]
+        return points, np.array(faces).reshape(-1), np.full(4, 4)
+
+    flat = [0.0] * 9
+    assert not bends(*grid(flat)) and not bends(*grid([0, 1, 2, 1, 2, 3, 2, 3, 4]))
+    assert bends(*grid([0, 1, 0] * 3)), "a roof is rounded"
+    assert bends(*grid([0, 0, 0, 0, 0, 1, 0, 0, 0])), "a face that is not flat"
+    assert bends(*grid(flat, 10.0)), "an outline that turns at a point of two faces is rounded"
+    points, corners, counts = grid(flat)
+    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    assert bends(cube, sides.reshape(-1), np.full(6, 4))
+    assert not bends(cube[sides.reshape(-1)], np.arange(24), np.full(6, 4)), "sides of their own corners stay sharp"
+    disk = np.stack([np.cos(np.arange(8.0)), np.sin(np.arange(8.0)), np.zeros(8)], axis=1)
+    assert not bends(disk, np.arange(8), np.array([8])) and not bends(points, corners[:0], counts[:0])
 
 
 SKINNED = """

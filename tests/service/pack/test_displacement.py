@@ -43,6 +43,23 @@ def test_a_ramp_displaces_a_plane_into_a_tilted_one() -> None:
     assert len(inside) > 400
 
 
+@pytest.mark.parametrize("wrap", [["clamp", "mirror"], ["mirror", "repeat"], ["repeat", "clamp"]])
+def test_heights_wrap_along_each_axis_by_itself(wrap: list[str]) -> None:
+    """A plane on which the image lies thrice both ways, from -1 to 2; away from the edges of the image."""
+    both = picture((ALONG[None, :, None] + 2 * ALONG[::-1, None, None]) / 3)
+    wide = {**PLANE, "uvs": [[-1, -1], [2, -1], [2, 2], [-1, 2]]}
+    found = triangles(mesh(**wide, max_edge=0.1), both, texture={"wrap": wrap}, midlevel=0).reshape(-1, 3)
+    uv = found[:, :2] / [2, 1] * 3 - 1
+    modes = {
+        "clamp": lambda x: np.clip(x, ALONG[0], ALONG[-1]), "repeat": lambda x: x % 1,
+        "mirror": lambda x: 1 - abs(x % 2 - 1),
+    }  # fmt: skip
+    u, v = (modes[each](x) for each, x in zip(wrap, uv.T, strict=True))
+    inside = (abs(uv - np.round(uv)) > 1 / N).all(axis=1)
+    np.testing.assert_allclose(found[inside, 2], 0.5 * (u + 2 * v)[inside] / 3, atol=1e-6)
+    assert inside.sum() > 400
+
+
 def test_heights_and_edges_are_metres_in_the_world() -> None:
     found = triangles(mesh(**PLANE, max_edge=0.1, transform={"scale": [3, 1, 0.1], "rotate": [0, 0, 90]}))
     x, z = found[..., 1].ravel(), found[..., 2].ravel()

@@ -159,6 +159,7 @@ const reference=options.find((node)=>node.properties?.texture);
 const whole=!options.some((node)=>node.type==="number");
 const limits=[top,...(numeric ? [numeric]:[])];
 const choices=bound(nodes,"enum");
+const pair=choices&&options.find((node)=>node.type==="array"&&node.maxItems===2&&node.items?.enum);
 const open={min:bound(limits,"exclusiveMinimum"),max:bound(limits,"exclusiveMaximum")};
 const min=bound(limits,"minimum")?? open.min;
 const max=bound(limits,"maximum")?? open.max;
@@ -169,7 +170,7 @@ const usual=color
 :vector
 ? "vector"
 :choices
-? "choice"
+?(pair&&"choices")||"choice"
 :options.some((node)=>node.type==="boolean")
 ? "toggle"
 :numeric
@@ -808,6 +809,26 @@ select.value=value ?? "";
 },
 };
 }
+function choices(field,id,{input,commit}){
+let latest=[];
+const selects=["U","V"].map((axis,i)=>{
+const write=(word)=>{
+latest=latest.map((old,k)=>(k===i ? word:old));
+input(latest[0]===latest[1] ? word:latest);
+};
+const one = choice({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, { input: write, commit });
+one.element.setAttribute("aria-label", `${field.title}, ${axis}`);
+const letter=element("i",{"aria-hidden":"true"},axis);
+return{...one,axis:element("span",{class:"axis","data-axis":axis},letter,one.element)};
+});
+return{
+element:element("div",{class:"vector"},...selects.map(({axis})=>axis)),
+show(value){
+latest=Array.isArray(value)? value:[value,value];
+selects.forEach((one,i)=>one.show(latest[i]));
+},
+};
+}
 function toggle(field,id,{input,commit}){
 const box=element("input",{
 type:"checkbox",
@@ -1007,6 +1028,7 @@ if(field.widget==="strength")return strengthControl(field,id,events);
 if(field.widget==="vector")return vector(field,id,events);
 if(field.widget==="texture")return{element:element("span",{id}),show(){}};
 if(field.widget==="file")return fileEntry(id,events);
+if(field.widget==="choices")return choices(field,id,events);
 if(field.widget==="choice")return choice(field,id,events);
 if(field.widget==="toggle")return toggle(field,id,events);
 if(field.widget==="number"||!bounded(field))return numberEntry(field,id,events,"wide");

@@ -159,8 +159,7 @@ class _Importer:
         limit = self.file.limits.max_triangles
         if self._triangles > limit:
             raise ParseError(f"the scene has more than the {limit} triangles allowed")
-        reaches = tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs)
-        name, material = self.materials.name(place, reaches)
+        name, material = self.materials.name(place, tuple(uv is not None for uv in primitive.uvs))
         tinted = primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any())
         if tinted and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(

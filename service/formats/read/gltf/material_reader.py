@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.formats.read.gltf.json_view import JsonView
-from service.formats.read.gltf.textures import Chart, ColorSpace, Textures
+from service.formats.read.gltf.textures import Charts, ColorSpace, Textures
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.surface.gltf_members import ROUGH
 from service.formats.surface.plain import Given
@@ -12,9 +12,7 @@ from service.formats.surface.plain import Given
 class MaterialReader:
     """One material for meshes that have these uv sets, and perhaps tangents."""
 
-    def __init__(
-        self, place: JsonView, textures: Textures, charts: tuple[Chart | None, ...], directed: bool, notes: Warnings
-    ) -> None:
+    def __init__(self, place: JsonView, textures: Textures, charts: Charts, directed: bool, notes: Warnings) -> None:
         self.place, self.textures, self.charts, self.directed, self.notes = place, textures, charts, directed, notes
 
     def owner(self, extension: str) -> JsonView | None:

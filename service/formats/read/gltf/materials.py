@@ -9,7 +9,7 @@ from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.material_inputs import MaterialInputs
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.specular_glossiness import converted
-from service.formats.read.gltf.textures import Chart, Textures
+from service.formats.read.gltf.textures import Charts, Textures
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.surface import gltf
@@ -31,14 +31,14 @@ class Materials:
         self._names: dict[tuple[Any, ...], str] = {}
         self._called: dict[str, list[str]] = {}  # names of documents by the file's name for them
 
-    def name(self, primitive: JsonView, charts: tuple[Chart | None, ...]) -> tuple[str, JsonView]:
+    def name(self, primitive: JsonView, charts: Charts) -> tuple[str, JsonView]:
         """The document's name for a primitive's material, and the material."""
         given = "material" in primitive
         place = self.file.follow(primitive, "material", "materials") if given else JsonView({}, "")  # all defaults
         attributes = primitive.need("attributes")
-        directed = charts[0] is not None or ("TANGENT" in attributes and "NORMAL" in attributes)
+        directed = charts[0] or ("TANGENT" in attributes and "NORMAL" in attributes)
         read = MaterialReader(place, self.textures, charts, directed, self.notes)
-        key = place.pointer, self.textures.kinds(charts), directed
+        key = place.pointer, charts, directed
         if key not in self._names:
             document = self._document(read)
             called = place.text("name") or place.pointer[1:].replace("/", " ") or "default"

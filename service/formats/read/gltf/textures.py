@@ -6,10 +6,7 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Literal
-
-import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.formats import sniff
@@ -19,13 +16,13 @@ from service.formats.read.gltf.json_view import JsonView, number
 from service.formats.read.gltf.primitives import UV_SETS
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.scenes.wrapping import wrap_of
 
 ColorSpace = Literal["srgb", "linear"]
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST = (9728, 9984, 9986)
 READ = ("png", "jpeg", "webp")
-SLACK = 1e-3  # of an image's side; coordinates that are beyond its edge by less are roundings
-Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates of a mesh (2,), v pointing down
+Charts = tuple[bool, ...]  # whether a mesh has each of its uv sets
 
 
 @dataclass
@@ -42,8 +39,8 @@ class Textures:
     _decoded: dict[str, bytes] = field(default_factory=dict)  # PNG files made of images, by their place
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
-    def use(self, info: JsonView | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
-        """The name of a texture; None, with a warning, where it cannot be used. `charts` are the mesh's uv sets."""
+    def use(self, info: JsonView | None, space: ColorSpace, charts: Charts) -> str | None:
+        """The name of a texture; None, with a warning, where it cannot be used. `charts`: the uv sets of the mesh."""
         if info is None:
             return None
         texture = self.file.follow(info, "index", "textures")
@@ -57,26 +54,12 @@ class Textures:
                 info.at("texCoord"), f"TEXCOORD_{uv} is not supported, only 0 and 1; the texture is left out"
             )
             return None
-        chart = charts[uv]
-        if chart is None:
+        if not charts[uv]:
             self.notes.add(
                 info.pointer, f"a mesh with this material has no TEXCOORD_{uv}; it is shown without the texture"
             )
             return None
-        wrap = self._wrap(texture, _reach(chart, placing))
-        return self.add(image, {"color_space": space, "wrap": wrap, **placing}, texture)
-
-    def kinds(self, charts: tuple[Chart | None, ...]) -> tuple[Any, ...]:
-        """A key that is equal where `use` gives the same for all textures of the file."""
-        if not self._mixed:
-            return tuple(chart is not None for chart in charts)
-        return tuple(chart if chart is None else tuple(np.concatenate(chart).tolist()) for chart in charts)
-
-    @cached_property
-    def _mixed(self) -> bool:
-        """True if a sampler wraps u and v in different ways."""
-        samplers = self.file.root.objects("samplers")
-        return any(one.value.get("wrapS", 10497) != one.value.get("wrapT", 10497) for one in samplers)
+        return self.add(image, {"color_space": space, "wrap": self._wrap(texture), **placing}, texture)
 
     def add(self, image: str, settings: dict[str, Any], named: JsonView) -> str:
         """The name of a texture with these settings; the same ones get the same name."""
@@ -128,8 +111,8 @@ class Textures:
             self._decoded[place.pointer] = ktx2_images.as_png(data, self.file.limits, place.pointer)
         return self._decoded[place.pointer]
 
-    def _wrap(self, texture: JsonView, reach: tuple[bool, bool]) -> str:
-        """The wrap mode of both axes; where they differ, that of the axis along which the mesh leaves the image."""
+    def _wrap(self, texture: JsonView) -> str | list[str]:
+        """The texture's `wrap`."""
         if "sampler" not in texture:
             return "repeat"
         sampler = self.file.follow(texture, "sampler", "samplers")
@@ -139,19 +122,12 @@ class Textures:
             if mode not in WRAPS:
                 raise sampler.error(name, f"must be one of {', '.join(map(str, WRAPS))}, not {mode}")
             found.append(WRAPS[mode])
-        if found[0] != found[1] and not all(reach):
-            found = found[::-1] if reach[1] else found
-        elif found[0] != found[1]:
-            self.notes.add(
-                sampler.at("wrapT"),
-                f"{found[1]} in v beside {found[0]} in u is not supported; {found[0]} is used for both",
-            )
         if sampler.whole("magFilter", 9729) in NEAREST:
             self.notes.add(
                 sampler.at("magFilter"),
                 "nearest-neighbour filtering is not supported; bilinear filtering is used instead",
             )
-        return found[0]
+        return wrap_of(*found)
 
     def _placing(self, info: JsonView) -> dict[str, Any]:
         """Scale, rotation, offset and uv set of a texture info, where they are not the defaults.
@@ -182,17 +158,6 @@ class Textures:
         source = self.source(texture)
         named = (source.text("name") if source else "") or texture.text("name")
         return unique(named or texture.pointer[1:].replace("/", " "), self.documents)
-
-
-def _reach(chart: Chart, placing: dict[str, Any]) -> tuple[bool, bool]:
-    """True if the texture is read beyond 0..1 in u, and in v, by coordinates of a box (v points down there)."""
-    corners = np.stack(np.meshgrid(*zip(*chart, strict=True)), axis=-1).reshape(-1, 2).astype(np.float64)
-    corners[:, 1] = 1 - corners[:, 1]
-    turn = math.radians(placing.get("rotation", 0.0))
-    c, s = math.cos(turn), math.sin(turn)
-    read = (corners * placing.get("scale", (1, 1))) @ np.array([[c, s], [-s, c]]) + placing.get("offset", (0, 0))
-    beyond = (read.min(axis=0) < -SLACK) | (read.max(axis=0) > 1 + SLACK)
-    return bool(beyond[0]), bool(beyond[1])
 
 
 def _channels(data: bytes, place: JsonView) -> str:

@@ -29,6 +29,7 @@ from service.formats.read.materialx.images import Images, srgb_bytes, texels_of
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.scenes.wrapping import wrap_of
 from service.formats.surface.trees import Tree, Unsupported, constant, less, walk
 from service.formats.types import Doubles, Floats
 
@@ -160,13 +161,12 @@ class Values:
     def _has_alpha(self, image: Tree) -> bool:
         return bool(self.images.decoded(image.texts["file"]).pixels.shape[2] == 4)
 
-    def _settings(self, image: Tree) -> dict[str, str]:
+    def _settings(self, image: Tree) -> dict[str, Any]:
         """The wrapping and the mapping of an image, where they are not the usual ones."""
         u, v = (WRAPS.get(image.texts[name], "repeat") for name in ("wrap_u", "wrap_v"))
-        if u != v:
-            self.notes.add(image.texts["place"], f"{v} in v beside {u} in u is not supported; {u} is used for both")
         mapping = image.texts.get("mapping", "uv")
-        return ({} if u == "repeat" else {"wrap": u}) | ({} if mapping == "uv" else {"mapping": mapping})
+        wrap = wrap_of(u, v)
+        return ({} if wrap == "repeat" else {"wrap": wrap}) | ({} if mapping == "uv" else {"mapping": mapping})
 
     def _named(self, file: str, document: dict[str, Any]) -> str:
         name = unique(posixpath.splitext(posixpath.basename(file))[0] or "texture", self.documents)

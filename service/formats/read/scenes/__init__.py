@@ -8,6 +8,7 @@ framing     a camera that shows everything
 room        a camera inside of closed rooms
 rays        rays against a file's triangles
 plain_mesh  the scene around a single mesh
+wrapping    images beyond their edges, and whether a mesh reads them there
 names       names for materials and textures
 warnings    warnings about a file, equal ones once
 """

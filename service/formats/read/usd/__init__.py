@@ -6,6 +6,7 @@ importer         a file -> a scene's document with its meshes and images as part
 package          the file: its layers in memory, and the images beside them
 walk             the prims that are shown, and where they stand
 meshes           a mesh -> triangles with normals, colours and texture coordinates
+subdivision      whether it would change the shape of a mesh
 solids           spheres, boxes, cylinders, cones, capsules and planes
 materials        materials -> the document's
 material_reader  the inputs of one surface, as the models read them

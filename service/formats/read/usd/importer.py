@@ -16,6 +16,7 @@ from service.formats.read.scenes.placements import Part, Placements
 from service.formats.read.scenes.ply_writer import ply
 from service.formats.read.scenes.room import stand_inside
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.scenes.wrapping import goes_beyond
 from service.formats.read.usd import cameras
 from service.formats.read.usd.lights import Lamp, Lights
 from service.formats.read.usd.materials import Bound, Materials
@@ -176,6 +177,10 @@ class _Importer:
         bound = self._bound(material, mesh)
         piece = mesh.piece(which, list(bound.charts), bound.is_colored)
         self._count(len(piece.faces))
+        for edge in bound.edges:
+            uvs = piece.uvs[bound.charts.index(edge.chart)]
+            if uvs is not None and len(uvs) and goes_beyond(uvs, edge.placing)[edge.axis]:
+                self.notes.add(edge.pointer, edge.detail)
         shape: dict[str, Any] = {"type": "mesh", "asset": self._stored(piece, mesh.pointer), "material": bound.name}
         if piece.normals is None:
             shape["smooth"] = False

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.networks import MOST_STEPS, Node
 from service.formats.read.usd.pictures import materialx_picture, picture
-from service.formats.read.usd.textures import Role, Textures
+from service.formats.read.usd.textures import Picture, Role, Textures
 from service.formats.surface import Model
 from service.formats.surface.inputs import COLORS
 from service.formats.surface.plain import Default, Given, PlainInputs
@@ -17,13 +18,26 @@ MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's mo
 PASSED = ("normalmap", "convert_", "dot_", "constant_", "extract_", "separate", "swizzle_")
 
 
+@dataclass(frozen=True)
+class Edge:
+    """A place that shows something else than the file's author asks for beyond an image's ends along an axis."""
+
+    chart: str
+    placing: dict[str, Any]
+    axis: int
+    pointer: str
+    detail: str
+
+
 class Reader(PlainInputs):
-    """The inputs of one surface. `charts` and `is_colored` say what of its meshes it uses."""
+    """The inputs of one surface. `charts` and `is_colored` say what of its meshes it uses, `edges` what is lost on
+    those that leave an image."""
 
     def __init__(self, surface: Node, model: Model, textures: Textures, unit: float, notes: Warnings) -> None:
         super().__init__(model.defaults)
         self.surface, self.textures, self.unit, self.notes = surface, textures, unit, notes
         self.charts: list[str] = []
+        self.edges: list[Edge] = []
         self.is_colored = False
         self._unread = surface  # the node of MaterialX at which reading ended
         model.read(self)
@@ -69,7 +83,7 @@ class Reader(PlainInputs):
         if steps > MOST_STEPS:
             return None
         if kind.startswith(("image_", "tiledimage_")):
-            found = self.textures.use(materialx_picture(node, role, self.notes), role, self.charts)
+            found = self._use(materialx_picture(node, role, self.notes), role)
             default = node.value("default", 0.0)
             plain = default if isinstance(default, tuple) else (float(default),) * 3
             return found or (plain if node.has("default") else None)
@@ -90,6 +104,12 @@ class Reader(PlainInputs):
             return {**split, "channel": output} if isinstance(split, dict) and output in "rgba" else split
         return self._materialx(inner, role, steps + 1)
 
+    def _use(self, picture: Picture, role: Role) -> dict[str, Any] | None:
+        found = self.textures.use(picture, role, self.charts)
+        if found is not None:
+            self.edges += [Edge(picture.chart, dict(picture.placing), *edge) for edge in picture.edges]
+        return found
+
     def _product(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
         """An image times a constant."""
         sides = [node.input(name, 1.0) for name in ("in1", "in2")]
@@ -109,7 +129,7 @@ class Reader(PlainInputs):
     def _read(self, node: Node, role: Role, default: tuple[float, ...]) -> dict[str, Any] | tuple[float, ...]:
         """A reference to the texture that a node is, or its fallback, or `default`."""
         if node.kind == "UsdUVTexture":
-            found = self.textures.use(picture(node, self.notes), role, self.charts)
+            found = self._use(picture(node, self.notes), role)
             fallback = node.numbers("fallback", (0.0, 0.0, 0.0, 1.0))
             return found or (fallback if node.has("fallback") else default)
         if node.kind.startswith("UsdPrimvarReader_float"):

@@ -9,7 +9,7 @@ from pxr import Usd, UsdShade
 
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.usd.material_reader import Reader
+from service.formats.read.usd.material_reader import Edge, Reader
 from service.formats.read.usd.networks import Node, surface_of
 from service.formats.read.usd.textures import Textures
 from service.formats.surface import MODELS
@@ -26,6 +26,7 @@ class Bound:
     name: str
     charts: tuple[str, ...] = ()  # primvars with texture coordinates, at most two
     is_colored: bool = False
+    edges: tuple[Edge, ...] = ()
 
 
 @dataclass
@@ -59,7 +60,7 @@ class Materials:
                 return None
             name = unique(material.GetPrim().GetName(), self.documents)
             self.documents[name] = read.document
-            self._bound[key] = Bound(name, tuple(read.charts), read.is_colored)
+            self._bound[key] = Bound(name, tuple(read.charts), read.is_colored, tuple(read.edges))
         return self._bound[key]
 
     def plain(self, color: list[float] | None, is_colored: bool) -> Bound:

@@ -13,6 +13,7 @@ from service.formats.errors import ParseError
 from service.formats.read.polygons import Longs, triangulate
 from service.formats.read.raw_mesh import area_weighted
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd.subdivision import bends
 from service.formats.types import Indices
 
 COLOR, OPACITY = "displayColor", "displayOpacity"
@@ -62,7 +63,7 @@ class Mesh:
             raise ParseError(f"{counts.sum()} corners make its faces, and it has {len(corners)}", self.pointer)
         if len(corners) and not 0 <= corners.min() <= corners.max() < len(self.points):
             raise ParseError(f"a face names point {corners.max()}; there are {len(self.points)}", self.pointer)
-        self._corners = corners
+        self._corners, self._counts = corners, counts
         self._face_of_corner = np.repeat(np.arange(len(counts)), counts)
         whole = counts >= 3
         holes = _array(mesh.GetHoleIndicesAttr().Get(time)).astype(np.int64)
@@ -147,7 +148,7 @@ class Mesh:
             rows = mesh.GetNormalsAttr().Get(self._time)
             if rows:
                 found = self._values("normals", rows, None, str(mesh.GetNormalsInterpolation()), 3)
-        if self.is_cage:
+        if self.is_cage and bends(self.points, self._corners, self._counts):
             self._notes.add(self.pointer, "subdivision is not supported; the surface is shown as its cage")
         if found is not None or not self.is_cage or not len(self.triangles):
             return found

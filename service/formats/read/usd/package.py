@@ -11,6 +11,7 @@ import os
 import posixpath
 import re
 from dataclasses import dataclass, field
+from functools import partial
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
@@ -55,7 +56,9 @@ class Package:
         self.root = self._layer(root)
         while self._unread:
             name = self._unread.pop()
-            UsdUtils.ModifyAssetPaths(self._layers[name], lambda path, name=name: self._replaced(name, path))
+            layer = self._layers[name]
+            composed = frozenset(layer.GetCompositionAssetDependencies())  # references, payloads and sublayers
+            UsdUtils.ModifyAssetPaths(layer, partial(self._replaced, name, composed))
 
     def stage(self) -> Usd.Stage:
         """The composed scene."""
@@ -77,13 +80,18 @@ class Package:
             self._unread.append(name)
         return self._layers[name]
 
-    def _replaced(self, layer: str, path: str) -> str:
-        """The path that a layer gets instead of its author's."""
+    def _replaced(self, layer: str, composed: frozenset[str], path: str) -> str:
+        """The path that a layer gets instead of its author's; `composed` are those that lead to other layers, by
+        whatever suffix."""
         found = self._located(layer, path)
         lower = path.lower()
-        if found is not None and found.lower().endswith(USD_LAYERS):
+        if found is not None and (found.lower().endswith(USD_LAYERS) or (path in composed and self._is_layer(found))):
             identifier: str = self._layer(found).identifier
             return identifier
+        if path in composed and not lower.endswith(".mtlx"):
+            what = ALONE if found is None else "which is no USD layer"
+            self.notes.add(layer or path, f"it refers to another file, {path[:100]!r}, {what}; that is left out")
+            return ""
         if found is not None and not lower.endswith(SHADERS):
             return INSIDE + found
         if lower.endswith((*USD_LAYERS, ".usdz", ".abc")) or "[" in path:
@@ -93,6 +101,10 @@ class Package:
             self.notes.add(layer or path, f"the MaterialX file {path[:100]!r} is not read; what is in it is left out")
             return ""
         return OUTSIDE + path[:200]
+
+    def _is_layer(self, name: str) -> bool:
+        assert self._files is not None
+        return self._files.read(name).startswith((USD_TEXT, CRATE))
 
     def _located(self, layer: str, path: str) -> str | None:
         """The name of a file of the package: relative to the layer, else to the package's root."""

@@ -8,7 +8,9 @@ from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.networks import Node
 from service.formats.read.usd.textures import Picture, Role
 
+# Images have no metadata of this kind, without which useMetadata is black.
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "clamp"}
+DARK = ("black", "useMetadata")
 ADDRESSES = {"periodic": "repeat", "mirror": "mirror", "clamp": "clamp", "constant": "clamp"}
 LINEAR = ("", "raw", "data", "lin_rec709", "lin_rec709_scene", "Raw", "none", "auto")
 
@@ -17,10 +19,11 @@ def picture(node: Node, notes: Warnings) -> Picture:
     """The image of a UsdUVTexture."""
     wraps = [str(node.value(name, "useMetadata")) for name in ("wrapS", "wrapT")]
     wrap = [WRAPS.get(one, "repeat") for one in wraps]
-    if wrap[0] != wrap[1]:
-        notes.add(node.at("wrapT"), f"{wraps[1][:20]} in t beside {wraps[0][:20]} in s is not supported; s is used")
-    if "black" in wraps:
-        notes.add(node.at("wrapS"), "black outside of an image is not supported; its edge goes on instead")
+    edges = tuple(
+        (axis, node.at(name), f"{word} outside of an image is not supported; its edge goes on instead")
+        for axis, (name, word) in enumerate(zip(("wrapS", "wrapT"), wraps, strict=True))
+        if word in DARK
+    )
     spaces = {"raw": "linear", "sRGB": "srgb"}
     space: Any = spaces.get(str(node.value("sourceColorSpace", "auto")), "auto")
     chart = "st"
@@ -40,8 +43,8 @@ def picture(node: Node, notes: Warnings) -> Picture:
     elif isinstance(at, Node):
         notes.add(at.pointer, f"{at.kind[:60]} as texture coordinates is not supported; st is used instead")
     return Picture(
-        str(node.value("file", "")), node.pointer, node.output, space, wrap[0],
-        node.numbers("scale", (1.0,) * 4), node.numbers("bias", (0.0,) * 4), chart, placing,
+        str(node.value("file", "")), node.pointer, node.output, space, (wrap[0], wrap[1]),
+        node.numbers("scale", (1.0,) * 4), node.numbers("bias", (0.0,) * 4), chart, placing, edges,
     )  # fmt: skip
 
 
@@ -67,9 +70,9 @@ def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
             node.at("file"), f"the colour space {named[:40]!r} is not supported; linear Rec.709 is used instead"
         )
     space: Any = "srgb" if named.startswith(("srgb", "g22_rec709")) and role == "color" else "linear"
-    addresses = [ADDRESSES.get(str(node.value(f"{axis}addressmode", "periodic")), "repeat") for axis in "uv"]
-    if addresses[0] != addresses[1]:
-        notes.add(node.at("vaddressmode"), "two address modes are not supported; that of u is used for both")
+    modes = [str(node.value(f"{axis}addressmode", "periodic")) for axis in "uv"]
+    lost = "a constant colour beyond the image is not supported; its edge goes on instead"
+    edges = tuple((k, node.at(f"{'uv'[k]}addressmode"), lost) for k in (0, 1) if modes[k] == "constant")
     chart, placing = _coordinates(node.input("texcoord"), notes)
     if "tiledimage" in node.kind:
         tiling, moved = node.numbers("uvtiling", (1.0, 1.0)), node.numbers("uvoffset", (0.0, 0.0))
@@ -78,8 +81,9 @@ def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
         elif tiling != (1.0, 1.0) or moved != (0.0, 0.0):
             placing = (("scale", list(tiling)), ("offset", [-moved[0], -moved[1]]))
     output = "a" if node.output == "outa" else "rgb"
+    u, v = (ADDRESSES.get(mode, "repeat") for mode in modes)
     return Picture(
-        str(node.value("file", "")), node.pointer, output, space, addresses[0], chart=chart, placing=placing
+        str(node.value("file", "")), node.pointer, output, space, (u, v), chart=chart, placing=placing, edges=edges
     )
 
 

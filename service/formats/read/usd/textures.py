@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import posixpath
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from service.formats.read.image import parse_image
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.scenes.wrapping import wrap_of
 from service.formats.read.usd.package import INSIDE, OUTSIDE, Package
 from service.formats.types import AssetLimits
 
@@ -37,11 +38,12 @@ class Picture:
     pointer: str
     output: str  # r, g, b, a or rgb
     space: Literal["auto", "srgb", "linear"] = "auto"
-    wrap: str = "repeat"
+    wrap: tuple[str, str] = ("repeat", "repeat")  # along u and v
     scale: tuple[float, ...] = AS_IT_IS[0]
     bias: tuple[float, ...] = AS_IT_IS[1]
     chart: str = "st"  # the name of the primvar with its texture coordinates
     placing: tuple[tuple[str, Any], ...] = ()  # members of a texture of the document
+    edges: tuple[tuple[int, str, str], ...] = ()  # axes beyond whose ends it shows something else than here: told
 
     @property
     def channel(self) -> str:
@@ -87,8 +89,9 @@ class Textures:
                 factor = {"factor": scale[0] if len(set(scale)) == 1 else list(scale)}
         else:
             asset = self._bake(picture, data, role, scale, bias, settings["color_space"] == "srgb")
-        if picture.wrap != "repeat":
-            settings["wrap"] = picture.wrap
+        wrap = wrap_of(*picture.wrap)
+        if wrap != "repeat":
+            settings["wrap"] = wrap
         uv = {"uv": charts.index(picture.chart)} if charts.index(picture.chart) else {}
         name = self._name(asset, settings | dict(picture.placing) | uv, picture.path)
         channel = {"channel": picture.channel} if role == "scalar" and picture.channel != "r" else {}
@@ -168,10 +171,7 @@ def _opaque(picture: Picture) -> Picture:
     """The picture with the alpha of an image that has none: 1."""
     scale, bias = list(picture.scale), list(picture.bias)
     bias[3], scale[3] = min(max(scale[3] + bias[3], 0.0), 1.0), 0.0
-    return Picture(
-        picture.path, picture.pointer, "a", picture.space, picture.wrap, tuple(scale), tuple(bias), picture.chart,
-        picture.placing,
-    )  # fmt: skip
+    return replace(picture, output="a", scale=tuple(scale), bias=tuple(bias))
 
 
 def _space(picture: Picture, data: bytes, bands: str) -> str:
