@@ -164,11 +164,21 @@ def _shines_both(s: SceneArrays) -> bool:
     return bool(((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any())
 
 
+def _layers(materials: np.ndarray) -> np.ndarray:
+    """True for each material if it has a layer that would lie over its emission."""
+    found = [of(materials, [model]) & (materials[name] > 0) for model in COVERING for name in model.covers_emission]
+    return np.asarray(np.any(found, axis=0))
+
+
 def _layered(s: SceneArrays) -> bool:
-    """True if some emission lies under a coat or fuzz."""
-    m = s.materials
-    layers = (m["clearcoat"] > 0) | (m["sheen"] > 0)
-    return bool((of(m, COVERING) & layers & (m["emission"] > 0).any(axis=1)).any())
+    """True if some emission lies under a layer."""
+    return bool((_layers(s.materials) & (s.materials["emission"] > 0).any(axis=1)).any())
+
+
+def _nearly_layered(s: SceneArrays) -> bool:
+    """True if one slider makes it lie under a layer, or lets what lies there shine."""
+    shines = of(s.materials, COVERING) & (s.materials["emission"] > 0).any(axis=1)
+    return bool((shines | _layers(s.materials)).any())
 
 
 def _veiled(s: SceneArrays) -> bool:
@@ -274,7 +284,7 @@ _ROWS = (
     _of_textures("HAS_HEIGHTS", _has_heights),
     _of_textures("HAS_COAT_NORMALS", _coat_apart, previewed=_normal_mapped),
     _of_textures("HAS_TEXTURED_LIGHTS", _veiled, previewed=_where("HAS_TEXTURES")),
-    Flag("HAS_LAYERED_LIGHTS", _layered, previewed=_any_of(COVERING), in_general=False),
+    Flag("HAS_LAYERED_LIGHTS", _layered, previewed=_nearly_layered, in_general=False),
     Flag("HAS_EMISSION", lambda s: bool((s.materials["emission"] > 0).any()), previewed=_always),
     Flag(
         "HAS_EMISSION_BOTH",

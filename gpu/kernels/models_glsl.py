@@ -17,7 +17,7 @@ and where the row in `gpu/layout/models.py` says so:
                                                with a chance of at least `least`
     NAME_straight(wo, behind, s)               `may_be_delta`: the share of light from wo that goes straight through a
                                                surface that bends nothing
-    NAME_emitted(s, wo)                        `covers_emission`: what its layers leave of its own light
+    NAME_emitted(wo, behind, s)                `covers_emission`: what its layers leave of its own light
     NAME_left(s, wi)                           `walks`: what the surface leaves of light that comes out from under it;
                                                NAME_sample has a lobe that enters
     NAME_terms(s, wo, wi, wm)                  `has_terms`: the Terms for a facet's normal wm
@@ -80,8 +80,8 @@ def text() -> str:
                     _only(deltas, "r = {}_sample_delta(wo, behind, u_lobe, least, s);")),
         _dispatcher("vec3 models_straight(vec3 wo, bool behind, inout Surface s)",
                     "vec3 r = vec3(0.0);", _only(deltas, "r = {}_straight(wo, behind, s);")),
-        _dispatcher("vec3 models_emitted(Surface s, vec3 wo)",
-                    "vec3 r = vec3(1.0);", _ladder(_with("covers_emission"), "r = {}_emitted(s, wo);")),
+        _dispatcher("vec3 models_emitted(vec3 wo, bool behind, inout Surface s)",
+                    "vec3 r = vec3(1.0);", _ladder(_with("covers_emission"), "r = {}_emitted(wo, behind, s);")),
         "#if HAS_WALKS",
         _dispatcher("vec3 models_left(Surface s, vec3 wi)",
                     "vec3 r = vec3(1.0);", _lobes(_with("walks"), "r = {}_left(s, wi);")),

@@ -46,7 +46,7 @@ class Model:
     needs_tables: bool = False  # it looks up what its lobes lose, in the tables of gpu/tables/energy.py
     has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
     has_coat_normals: bool = False  # its coat may have a normal of its own
-    covers_emission: bool = False  # its emission lies under its coat and its fuzz
+    covers_emission: tuple[str, ...] = ()  # members of `layout.Material`: the layers under which its emission lies
     # The member of `layout.Material` with the colour of what is under the surface, where light walks if `subsurface`
     # and `subsurface_radius` are above 0; empty: light never does.
     walk_color: str = ""
@@ -127,6 +127,7 @@ MODELS = (
         needs_tables=True,
         has_terms=True,
         has_coat_normals=True,
+        covers_emission=("clearcoat",),
         has_members=True,
         walk_color="base_color",
         optional=(*_LAYERS, "conductor_eta", "film_thickness"),
@@ -141,7 +142,7 @@ MODELS = (
         needs_tables=True,
         has_terms=True,
         has_coat_normals=True,
-        covers_emission=True,
+        covers_emission=("clearcoat", "sheen"),
         has_members=True,
         walk_color="subsurface_color",
         optional=(

@@ -5,6 +5,6 @@ vec3 light_layers(SurfacePoint at, vec3 w) {
     Interaction here;
     Material m;
     Surface s = interaction_lone(at, w, medium_outside(), here, m);
-    return models_emitted(s, here.wo);
+    return models_emitted(here.wo, here.behind, s);
 }
 #endif

@@ -113,7 +113,7 @@ SCENES: dict[str, Doc] = {
     "HEIGHTS": textured({"height": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}, ball("m"), FLOOR),
     "COAT_NORMALS": textured({"clearcoat": 1, "clearcoat_normal_map": T}, color_space="linear"),
     "EMISSION": made_of(LAMP), "EMISSION_BOTH": made_of({**LAMP, "emission_sides": "both"}),
-    "LAYERED_LIGHTS": made_of({"type": "openpbr", "emission_luminance": 683, "coat_weight": 1}),
+    "LAYERED_LIGHTS": made_of({"type": "principled", "base_color": 0, "emission": 1, "clearcoat": 1}),
     "SPHERE_LIGHTS": made_of(LAMP, ball("m")), "QUAD_LIGHTS": made_of(LAMP, FLOOR),
     "TRIANGLE_LIGHTS": made_of(LAMP, TRIANGLE), "ELLIPSOID_LIGHTS": made_of(LAMP, ball("m", **ODD)),
     "CYLINDER_LIGHTS": made_of(LAMP, CYLINDER),

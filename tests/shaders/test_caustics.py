@@ -246,6 +246,27 @@ def test_both_ways_agree(gpu: Renderer, name: str) -> None:
     assert abs(means[0] - means[1]) < 4 * deviation and brought > 4 * deviation
 
 
+@pytest.mark.parametrize("coat", [{"clearcoat": 1, "clearcoat_roughness": 0.4}, {"clearcoat": 0.5}])
+def test_light_leaves_a_coat_towards_the_ball_as_it_is_seen_there(gpu: Renderer, coat: dict[str, Any]) -> None:
+    """A small lamp far off sends its light at 75 degrees: what its coat leaves of that reaches the floor."""
+    away = np.array([-1.6, 1.7, -0.1]) / np.linalg.norm([-1.6, 1.7, -0.1])
+    cosine = np.cos(np.radians(75))
+    n = -cosine * away + np.sin(np.radians(75)) * _across(away)[0]
+    u, v = (0.1 * each for each in _across(n))
+    panel = {"type": "quad", "origin": (CENTER + 30 * away - (u + v) / 2).tolist(), "u": u.tolist(), "v": v.tolist(),
+             "material": "lamp"}  # fmt: skip
+    seen = scene(SUN, lights=[])
+    seen["shapes"].append(panel)
+    brought = []
+    for layers in ({}, coat):
+        lamp = {"type": "principled", "base_color": 0, "emission": 1e6, **layers}
+        shone = seen | {"materials": seen["materials"] | {"lamp": lamp}}
+        made = picture(gpu, shone, 64, caustics="light", width=24, height=24, max_bounces=4)
+        brought.append(caustic(made).mean())
+    taken = float(coat["clearcoat"] * _fresnel(np.array(cosine), 1.5))
+    assert brought[1] / brought[0] == pytest.approx(1 - taken, abs=0.02 * coat["clearcoat"]) and taken > 0.1
+
+
 def test_filter_glossy_blurs_what_no_path_finds(gpu: Renderer) -> None:
     """The camera's paths then find about as much light of a lamp without extent as a light tracer does, elsewhere."""
     settings: dict[str, Any] = {"width": 48, "height": 48, "max_bounces": 8}

@@ -363,10 +363,12 @@ vec3 openpbr_straight(vec3 wo, bool behind, inout Surface s) {
 }
 
 // What fuzz and coat leave of light that is sent out from under them towards wo, without the reflections below the coat.
-vec3 openpbr_emitted(Surface s, vec3 wo) {
+vec3 openpbr_emitted(vec3 wo, bool behind, inout Surface s) {
+    s.bare = openpbr_is_bare(s, behind);
     openpbr_face_layers(wo, s);
     vec3 left = vec3(1.0 - s.sheen_albedo);
 #if HAS_CLEARCOAT
+    if (s.bare) return left;
     vec3 crossed = coat_crossed(s, coat_to_local(s, wo).z);
     left *= mix(vec3(1.0), crossed, s.clearcoat) * (1.0 - s.coat_albedo);
 #endif

@@ -362,6 +362,17 @@ void principled_deltas(Surface s, vec3 wo, inout LobeSample deltas[BSDF_DELTAS])
 #endif
 }
 
+// What the coat leaves of light that is sent out from under it towards wo: 1 less its weight times its Fresnel
+// reflectance there, whatever its roughness [Khronos, KHR_materials_clearcoat, "Emission"], by the coat's own index.
+vec3 principled_emitted(vec3 wo, bool behind, inout Surface s) {
+    base_side(behind, s);
+    float left = 1.0;
+#if HAS_CLEARCOAT
+    if (!s.inside) left -= s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), CLEARCOAT_ETA);
+#endif
+    return vec3(left);
+}
+
 Terms principled_terms(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     return Terms(base_fresnel(s, wm.z), ggx_d(bsdf_turn(s, wm), s.alpha),
                  ggx_visibility(bsdf_turn(s, wo), bsdf_turn(s, wi), s.alpha), !s.is_delta);
