@@ -301,8 +301,8 @@ class Graphs:
         if size is None:
             raise Unsupported(f"a value of type {type[:40]} is not supported")
         try:
-            numbers = [WHOLE.get(one.strip()) for one in text.split(",")]
-            found = [float(one) if n is None else n for n, one in zip(numbers, text.split(","), strict=True)]
+            words = text.replace(",", " ").split()  # commas, blanks or both stand between them, as in the library
+            found = [WHOLE[one] if one in WHOLE else float(one) for one in words]
         except ValueError:
             raise ParseError(f"must be {size} number{'s' * (size > 1)}, not {text[:60]!r}", place) from None
         if len(found) != size or not all(abs(one) <= LARGEST for one in found):
