@@ -10,6 +10,7 @@ preview       UsdPreviewSurface
 disney        the Disney model
 wavefront     the statements of .mtl libraries
 parts         what several of them have in common
+choice        which of two materials loses less of a surface
 gltf_members  where a glTF file says the inputs of its model
 inputs        what a model reads a shader by, and the parameters that it sets
 plain         inputs that are numbers, colours and textures

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 
-from service.formats.surface.trees import Tree, Unsupported
+from service.formats.surface.trees import Tree, Unsupported, applied, constant
 from service.formats.types import BRIGHTEST, LARGEST
 
 LEAST_LENGTH = 1e-9  # metres
@@ -32,6 +33,8 @@ COLORS = (
 )  # fmt: skip
 TANGENT = "a tangent of the file's own is not supported; that of the texture coordinates is used"
 Triple = tuple[float, float, float]
+# What a loss weighs beside others: an approximation, a parameter, a whole part of the material.
+ROUGHLY, LOST, PART = 0.5, 1.0, 2.0
 
 
 class Inputs(ABC):
@@ -43,6 +46,25 @@ class Inputs(ABC):
 
     def __init__(self) -> None:
         self.material: dict[str, Any] = {"type": "principled"}
+        self.is_trial = False  # it only finds out what would be lost: nothing is warned of and no image is made
+        self._losses: dict[tuple[str, str], float] = {}
+
+    def trial(self) -> Self:
+        """A copy that only finds out what a reading of it would lose."""
+        made = copy(self)
+        made.material, made._losses, made.is_trial = dict(self.material), {}, True
+        return made
+
+    @property
+    def lost(self) -> float:
+        """The sum of what the losses weigh."""
+        return sum(self._losses.values())
+
+    def note(self, name: str, detail: str, weight: float = LOST) -> None:
+        """Warn of a loss at the place of an input."""
+        self._losses[name, detail] = weight
+        if not self.is_trial:
+            self.warn(name, detail)
 
     @abstractmethod
     def tree(self, name: str) -> Tree:
@@ -79,8 +101,14 @@ class Inputs(ABC):
         """Set the heights above the surface."""
 
     @abstractmethod
-    def note(self, name: str, detail: str) -> None:
+    def warn(self, name: str, detail: str) -> None:
         """Warn at the place of an input."""
+
+    def masked(self, name: str, mask: str) -> Tree:
+        """The input where the input `mask` is at least 0.5, 0 elsewhere."""
+        return applied(
+            "ifgreatereq", 1, value1=self.tree(mask), value2=constant(0.5), in1=self.tree(name), in2=constant(0.0)
+        )
 
     def is_set(self, name: str) -> bool:
         """True if a switch is on."""
@@ -136,8 +164,12 @@ class Inputs(ABC):
     ) -> None:
         """Set a parameter to a tree, whose place is that of the input `name`; not where that is its default.
         `instead` serves where the format's reader cannot compute the tree."""
+        low, high = RANGES.get(parameter, (0.0, 1.0))
         try:
-            value = self.value(tree, name, *RANGES.get(parameter, (0.0, 1.0)), is_color=parameter in COLORS)
+            if self.is_trial and self.computes:
+                value = self._tried(tree, name, low, high)
+            else:
+                value = self.value(tree, name, low, high, is_color=parameter in COLORS)
         except Unsupported as problem:
             how = "the parameter is left out" if instead is None else "the input itself is used instead"
             self.note(name, f"{problem}; {how}")
@@ -147,7 +179,20 @@ class Inputs(ABC):
         if default is None or isinstance(value, dict | list) or abs(value - default) > 1e-6:
             self.material[parameter] = value
 
+    def _tried(self, tree: Tree, name: str, low: float, high: float) -> Any:
+        """What `value` would give, without an image that takes long to compute."""
+        found = self.fixed(tree)
+        if found is None:
+            return {}
+        inside = np.clip(found, low, high)
+        if np.abs(inside - found).max() > 1e-6:
+            self.note(name, f"values beyond {low:g}..{high:g}")
+        numbers = [float(one) for one in inside]
+        return numbers[0] if len(set(numbers)) == 1 else numbers
+
     def normal(self, parameter: str, name: str) -> None:
+        if self.is_trial:
+            return
         try:
             found = self.bump(name)
         except Unsupported as problem:

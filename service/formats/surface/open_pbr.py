@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from service.formats.surface.inputs import RANGES, Inputs, Triple
 from service.formats.surface.plain import Default
-from service.formats.surface.trees import constant, times
+from service.formats.surface.trees import Tree, constant, times
 from service.formats.types import LARGEST
 
 WHITE: Triple = (1.0, 1.0, 1.0)
 BLACK: Triple = (0.0, 0.0, 0.0)
 RADIUS_SCALE: Triple = (1.0, 0.5, 0.25)
 NITS = 1 / 683  # W/(m^2 sr) of 1 cd/m^2
+NEGLIGIBLE = 0.5  # a coat whose roughness is at most this share of the base's makes that at most 3 % rougher
+ROUGHER = "a rough coat makes what is under it rougher"
+FUZZY = "the sheen is shown as fuzz, whose reach by its roughness is another"
+UNCUT = "the model has no cut-off: rays meet the surface by the chance of its opacity"
 # Inputs that may be textures, and their defaults, which are those of `openpbr`.
 SAME: dict[str, float | Triple] = {
     "base_weight": 1.0, "base_color": (0.8,) * 3, "base_diffuse_roughness": 0.0, "base_metalness": 0.0,
@@ -60,7 +64,39 @@ def first(name: str) -> float:
     return found[0] if isinstance(found, tuple) else found
 
 
-# What standard_surface has as well, when it is read as `openpbr`.
+# What other models have as well, when they are read as `openpbr`.
+
+
+def begin(s: Inputs) -> None:
+    """Make the material one of this model."""
+    s.material.clear()
+    s.material["type"] = "openpbr"
+
+
+def roughens(s: Inputs, coat: str, base: str) -> bool:
+    """True if the coat, whose roughness is the input `coat`, makes what is under it rougher than the file says."""
+    above, below = s.constant(coat), s.constant(base)
+    return above is None or below is None or above[0] > NEGLIGIBLE * below[0]
+
+
+def lacquer(s: Inputs, weight: str, roughness: str, base: str, normal: str | None = None) -> None:
+    """A clear coat of index 1.5 that darkens nothing."""
+    if not s.is_used(weight, 0):
+        return
+    s.put("coat_weight", weight, s.tree(weight), 0.0)
+    s.put("coat_roughness", roughness, s.tree(roughness), 0.0)
+    s.material |= {"coat_ior": 1.5, "coat_darkening": 0.0}
+    if roughens(s, roughness, base):
+        s.note(roughness, ROUGHER)
+    if normal is not None:
+        s.normal("geometry_coat_normal", normal)
+
+
+def shine(s: Inputs, light: Tree, name: str) -> None:
+    """Emission by one input, a radiance."""
+    if not s.is_black(light):
+        s.material["emission_luminance"] = round(1 / NITS, 6)
+        s.put("emission_color", name, light)
 
 
 def number(s: Inputs, parameter: str, found: float, default: float) -> None:

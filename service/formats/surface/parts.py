@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from service.formats.surface.inputs import Inputs
+import numpy as np
+
+from service.formats.surface.inputs import ROUGHLY, Inputs
 from service.formats.surface.trees import (
     Tree,
     added,
+    alike,
     applied,
     clamped,
     complement,
     constant,
     largest,
     less,
+    mixed,
     quotient,
     raised,
     times,
@@ -35,6 +39,19 @@ def index(f0: Tree) -> Tree:
 def reflectance(ior: Tree) -> Tree:
     """The reflectance head-on of an index of refraction."""
     return raised(applied("absval", 1, **{"in": quotient(less(ior, constant(1.0)), added(ior, constant(1.0)))}), 2.0)
+
+
+def passing(s: Inputs, base: Tree, color: Tree, share: Tree, name: str) -> Tree:
+    """The one colour that `principled` has for what it scatters, `base`, and for what passes through: their mix by
+    a share, which is told at the input `name` where they differ and both are seen."""
+    if s.material.get("metallic") == 1 or alike(base, color):
+        return base
+    passes, both = s.fixed(share), (s.fixed(base), s.fixed(color))
+    is_whole = passes is not None and bool(passes[0] == 1)
+    is_same = both[0] is not None and both[1] is not None and bool(np.allclose(*both, atol=1e-6))
+    if not is_whole and not is_same:
+        s.note(name, "what passes through and what is scattered have one colour here, a mix of both")
+    return mixed(base, color, share)
 
 
 def dielectric(
@@ -85,7 +102,7 @@ def coat(s: Inputs, weight: str, roughness: str, ior: str | None = None, normal:
     share = s.tree(weight)
     if ior is not None and s.is_used(ior, 1.5):
         share = times(share, times(reflectance(s.tree(ior)), 1 / COAT_F0))
-        s.note(ior, "the coat's index is 1.5; another one makes it stronger or weaker instead")
+        s.note(ior, "the coat's index is 1.5; another one makes it stronger or weaker instead", ROUGHLY)
     s.put("clearcoat", weight, share, 0.0)
     s.put("clearcoat_roughness", roughness, s.tree(roughness))
     if normal is not None:
@@ -95,6 +112,8 @@ def coat(s: Inputs, weight: str, roughness: str, ior: str | None = None, normal:
 def film(s: Inputs, thickness: str, ior: str, weight: str | None = None) -> None:
     """A thin film, whose thickness is in nanometres. Ours covers all or nothing."""
     share = [1.0] if weight is None else s.constant(weight)
+    if weight is not None and share is None and not s.computes and float(s.most(weight)[0]) < HALF:
+        share = [float(s.most(weight)[0])]
     if weight is not None and share is not None and 0 < share[0] < 1:
         how = "it covers all" if share[0] >= HALF else "it is left out"
         s.note(weight, f"a film that covers a part of the surface is not supported; of {share[0]:g} {how}")
@@ -103,7 +122,7 @@ def film(s: Inputs, thickness: str, ior: str, weight: str | None = None) -> None
     tree = s.tree(thickness)
     if weight is not None and share is None:
         s.note(weight, "a film covers all of a texel or nothing here: all where this is 0.5 or more")
-        tree = applied("ifgreatereq", 1, value1=s.tree(weight), value2=constant(HALF), in1=tree, in2=constant(0.0))
+        tree = s.masked(thickness, weight)
     if not s.is_black(tree):
         s.put("film_thickness", thickness, tree, 0.0)
     if "film_thickness" in s.material:

@@ -46,18 +46,20 @@ class PlainInputs(Inputs):
     def tree(self, name: str) -> Tree:
         if name not in self._trees:
             default = self.defaults[name]
-            found = self.given(name, default)
-            size = 3 if isinstance(default, tuple) else 1
-            if isinstance(found, dict):
-                reference = dict(found)
-                factor = reference.pop("factor", 1.0)
-                by = constant(*factor) if isinstance(factor, list) else constant(factor)
-                self._trees[name] = times(Texture("texture", size, reference=reference), by)
-            else:
-                plain = default if found is None else found
-                numbers = plain if isinstance(plain, tuple) else (plain or 0.0,) * size
-                self._trees[name] = constant(*numbers[:size])
+            self._trees[name] = self.made_tree(self.given(name, default), default)
         return self._trees[name]
+
+    def made_tree(self, found: Given | None, default: Default) -> Tree:
+        """The tree of what `given` says."""
+        size = 3 if isinstance(default, tuple) else 1
+        if isinstance(found, dict):
+            reference = dict(found)
+            factor = reference.pop("factor", 1.0)
+            by = constant(*factor) if isinstance(factor, list) else constant(factor)
+            return times(Texture("texture", size, reference=reference), by)
+        plain = default if found is None else found
+        numbers = plain if isinstance(plain, tuple) else (plain or 0.0,) * size
+        return constant(*numbers[:size])
 
     def constant(self, name: str) -> list[float] | None:
         return None if self.is_textured(name) else super().constant(name)

@@ -4,7 +4,8 @@ docs/files.md has the same tables in words."""
 from __future__ import annotations
 
 from service.formats.surface import open_pbr, parts
-from service.formats.surface.inputs import TANGENT, Inputs, Triple
+from service.formats.surface.choice import read_best
+from service.formats.surface.inputs import PART, ROUGHLY, TANGENT, Inputs, Triple
 from service.formats.surface.open_pbr import BLACK, NITS, RADIUS_SCALE, WHITE
 from service.formats.surface.plain import Default
 from service.formats.surface.trees import (
@@ -32,42 +33,17 @@ DEFAULTS: dict[str, Default] = {
     "coat_affect_roughness": 0.0, "thin_film_thickness": 0.0, "thin_film_IOR": 1.5, "emission": 0.0,
     "emission_color": WHITE, "opacity": WHITE, "thin_walled": 0.0, "normal": None, "tangent": None,
 }  # fmt: skip
-NEGLIGIBLE = 0.5  # a coat whose roughness is at most this share of the base's makes that at most 3 % rougher
 NARROWEST = 0.98  # the anisotropy beyond which nothing changes
 EXTRA = ("transmission_extra_roughness", 0.0, "a roughness of the transmission alone is not supported")
 
 
 def standard_surface(s: Inputs) -> None:
-    if _suits_openpbr(s):
-        _openpbr(s)
-    else:
-        _principled(s)
-
-
-def _suits_openpbr(s: Inputs) -> bool:
-    """True if more is used that only `openpbr` has than what only `principled` has."""
-    is_thin = s.is_set("thin_walled")
-    if s.is_used("subsurface", 0):
-        return not is_thin
-    if not is_thin and s.is_used("transmission", 0) and s.is_used("transmission_scatter", 0):
-        return True
-    gained = int(s.is_used("diffuse_roughness", 0)) + int(
-        s.is_used("metalness", 0) and s.is_used("specular_color", 1)
-    )
-    if s.is_used("coat", 0):
-        neutral = {
-            "coat_color": 1.0, "coat_IOR": 1.5, "coat_anisotropy": 0.0, "coat_affect_color": 0.0,
-            "coat_affect_roughness": 0.0,
-        }  # fmt: skip
-        gained += sum(s.is_used(name, value) for name, value in neutral.items())
-    lost = int(s.is_used("sheen", 0)) + int(s.is_used("coat", 0) and _roughens(s))
-    turned = ("specular_rotation", *(["coat_rotation"] if s.is_used("coat_anisotropy", 0) else []))
-    lost += sum(s.constant(name) is None for name in turned)
-    return gained > lost
+    read_best(s, _principled, _openpbr)
 
 
 def _principled(s: Inputs) -> None:
     metalness = s.tree("metalness")
+    s.put("metallic", "metalness", metalness, 0.0)
     base = times(s.tree("base_color"), s.tree("base"))
     is_thin = s.is_set("thin_walled")
     if is_thin:
@@ -75,12 +51,15 @@ def _principled(s: Inputs) -> None:
     if s.is_used("subsurface", 0) and is_thin:  # all that the library's own graph scatters goes through then
         s.put("diffuse_transmission", "subsurface_color", s.tree("subsurface"), 0.0)
         s.put("diffuse_transmission_color", "subsurface_color", s.tree("subsurface_color"))
+    elif s.is_used("subsurface", 0):
+        s.note("subsurface", "light that walks below the surface is left out", PART)
+    if s.is_used("transmission", 0) and s.is_used("transmission_scatter", 0):
+        s.note("transmission_scatter", "what scatters inside of the body is left out", PART)
     base = _through(s, base, is_thin)
     if s.is_used("coat", 0) and s.is_used("coat_color", 1):
         s.note("coat_color", "the colour of the coat tints what is under it, at all angles alike")
         base = times(base, mixed(constant(*WHITE), s.tree("coat_color"), s.tree("coat")))
     s.put("base_color", "base_color", base, instead=s.tree("base_color"))
-    s.put("metallic", "metalness", metalness, 0.0)
     s.put("roughness", "specular_roughness", s.tree("specular_roughness"))
     if s.is_used("specular_anisotropy", 0):
         parts.stretched(s, "specular_anisotropy", complement(_anisotropy(s, "specular_anisotropy")))
@@ -110,15 +89,15 @@ def _principled(s: Inputs) -> None:
 
 def _through(s: Inputs, base: Tree, is_thin: bool) -> Tree:
     """The colour of what light passes through: of the inside where it has a depth, else of the surface."""
-    weight, color = s.tree("transmission"), s.tree("transmission_color")
+    color = s.tree("transmission_color")
     if not s.is_used("transmission", 0):
         return base
     distance = 0.0 if is_thin else s.number("transmission_depth", 0.0) * s.unit
     if distance > 0:
         s.put("attenuation_distance", "transmission_depth", constant(distance))
         s.put("attenuation_color", "transmission_color", color)
-        return mixed(base, constant(*WHITE), weight)
-    return mixed(base, color, weight)
+        color = constant(*WHITE)
+    return parts.passing(s, base, color, s.tree("transmission"), "transmission_color")
 
 
 def _specular(s: Inputs) -> None:
@@ -134,7 +113,7 @@ def _specular(s: Inputs) -> None:
 
 
 def _openpbr(s: Inputs) -> None:
-    s.material["type"] = "openpbr"
+    open_pbr.begin(s)
     _same(s, "base_weight", "base")
     s.put("base_color", "base_color", s.tree("base_color"))
     if s.is_used("subsurface", 0):
@@ -144,7 +123,9 @@ def _openpbr(s: Inputs) -> None:
     _same(s, "specular_weight", "specular")
     _same(s, "specular_color", "specular_color")
     if s.is_used("metalness", 0) and s.is_used("specular_color", 1):
-        s.note("specular_color", "a metal has this colour near its edge rather than at it")
+        s.note("specular_color", "a metal has this colour near its edge rather than at it", ROUGHLY)
+    if s.is_used("metalness", 0) and s.is_used("specular", 1):
+        s.note("specular", "it multiplies a metal's reflection as well")
     _same(s, "specular_ior", "specular_IOR")
     _stretched(s, "specular_roughness", "specular_anisotropy", "specular_rotation", "geometry_tangent")
     if s.is_used("transmission", 0):
@@ -159,13 +140,15 @@ def _openpbr(s: Inputs) -> None:
         s.put("thin_film_ior", "thin_film_IOR", s.tree("thin_film_IOR"), 1.4)
     if s.is_set("thin_walled"):
         s.material["geometry_thin_walled"] = True
+        if s.is_used("subsurface", 0):
+            s.note("subsurface", "what a thin wall scatters leaves it on both sides")
     if s.is_used("coat", 0):
         _coat(s)
     if s.is_used("sheen", 0):
         _same(s, "fuzz_weight", "sheen")
         _same(s, "fuzz_color", "sheen_color")
         _same(s, "fuzz_roughness", "sheen_roughness")
-        s.note("sheen", "the sheen is shown as fuzz, whose reach by its roughness is another")
+        s.note("sheen", open_pbr.FUZZY)
     open_pbr.emission(s, "emission", 1 / NITS)
     s.put("geometry_opacity", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("geometry_normal", "normal")
@@ -194,19 +177,10 @@ def _coat(s: Inputs) -> None:
     _stretched(s, "coat_roughness", "coat_anisotropy", "coat_rotation", "geometry_coat_tangent")
     s.put("coat_darkening", "coat_affect_color", clamped(s.tree("coat_affect_color"), 0.0, 1.0), 1.0)
     if s.is_used("coat_affect_color", 0):
-        s.note("coat_affect_color", "the coat darkens what is under it by its reflections, not by a power")
-    if _roughens(s):
-        s.note("coat_affect_roughness", "a rough coat makes what is under it rougher")
+        s.note("coat_affect_color", "the coat darkens what is under it by its reflections, not by a power", ROUGHLY)
+    if s.constant("coat_affect_roughness") != [1.0] and open_pbr.roughens(s, "coat_roughness", "specular_roughness"):
+        s.note("coat_affect_roughness", open_pbr.ROUGHER)
     s.normal("geometry_coat_normal", "coat_normal")
-
-
-def _roughens(s: Inputs) -> bool:
-    """True if the coat of `openpbr` makes what is under it rougher than the file says."""
-    affects = s.constant("coat_affect_roughness")
-    if affects == [1.0]:
-        return False
-    coat, base = s.constant("coat_roughness"), s.constant("specular_roughness")
-    return coat is None or base is None or coat[0] > NEGLIGIBLE * base[0]
 
 
 def _anisotropy(s: Inputs, name: str) -> Tree:

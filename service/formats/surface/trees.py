@@ -93,6 +93,27 @@ def largest(a: Tree) -> Tree:
     return a if a.size == 1 else Tree("largest", 1, {"in": a})
 
 
+def alike(a: Tree, b: Tree) -> bool:
+    """True if two trees compute the same by the same operations."""
+    seen, left = set[tuple[int, int]](), [(a, b)]
+    while left:
+        one, other = left.pop()
+        if one is other or (id(one), id(other)) in seen:
+            continue
+        seen.add((id(one), id(other)))
+        own, others = ({k: v for k, v in vars(each).items() if k not in ("inputs", "value")} for each in (one, other))
+        if own != others or one.inputs.keys() != other.inputs.keys():
+            return False
+        if not np.array_equal(_numbers(one), _numbers(other)):
+            return False
+        left += [(found, other.inputs[name]) for name, found in one.inputs.items()]
+    return True
+
+
+def _numbers(tree: Tree) -> Any:
+    return () if tree.value is None else tree.value.astype(np.float32)
+
+
 def walk(tree: Tree) -> list[Tree]:
     """All trees of which this one is made, each once, itself first."""
     seen, left = {id(tree): tree}, [tree]

@@ -34,8 +34,14 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
     store.close()
 
 
-def film(store: AssetStore, extension: dict[str, Any], file: Gltf | None = None) -> tuple[dict[str, Any], Imported]:
-    found = imported(store, (file or Gltf()).of({"extensions": {NAME: extension}}))
+# `openpbr` has no cut-off, so that a material with one is `principled`, whose films cover all or nothing.
+CUT = {"alphaMode": "MASK"}
+
+
+def film(
+    store: AssetStore, extension: dict[str, Any], file: Gltf | None = None, **more: Any
+) -> tuple[dict[str, Any], Imported]:
+    found = imported(store, (file or Gltf()).of({"extensions": {NAME: extension}, **more}))
     (made,) = found.document["materials"].values()
     return made, found
 
@@ -63,18 +69,28 @@ def test_no_film(store: AssetStore, extension: dict[str, Any]) -> None:
     assert not {"film_thickness", "film_ior"} & made.keys() and not noted(found)
 
 
-def test_a_part_of_a_film_is_told(store: AssetStore) -> None:
-    made, found = film(store, {"iridescenceFactor": 0.7})
+def test_a_part_of_a_film_is_openpbr_s(store: AssetStore) -> None:
+    made, found = film(store, {"iridescenceFactor": 0.25, "iridescenceIor": 1.8})
+    names = ("thin_film_weight", "thin_film_thickness", "thin_film_ior")
+    assert [made["type"], *map(made.get, names)] == ["openpbr", 0.25, pytest.approx(0.4), 1.8]
+    assert list(noted(found)) == [AT] and "other hues" in noted(found)[AT]
+
+
+def test_a_part_of_a_film_is_told_on_principled(store: AssetStore) -> None:
+    made, found = film(store, {"iridescenceFactor": 0.7}, **CUT)
     assert made["film_thickness"] == 400 and "of 0.7 it covers all" in noted(found)[f"{AT}/iridescenceFactor"]
-    made, found = film(store, {"iridescenceFactor": 0.3})
+    made, found = film(store, {"iridescenceFactor": 0.3}, **CUT)
     assert "film_thickness" not in made and "of 0.3 it is left out" in noted(found)[f"{AT}/iridescenceFactor"]
 
 
 def test_beyond_our_ranges(store: AssetStore) -> None:
     given = {"iridescenceFactor": 1, "iridescenceIor": 5, "iridescenceThicknessMaximum": 20000}
-    made, found = film(store, given)
+    made, found = film(store, given, **CUT)
     assert (made["film_thickness"], made["film_ior"]) == (10000, 4)
     assert {f"{AT}/iridescenceIor", f"{AT}/iridescenceThicknessMaximum"} <= noted(found).keys()
+    made, found = film(store, given)
+    assert (made["thin_film_thickness"], made["thin_film_ior"]) == (10, 5), "an index that openpbr has"
+    assert f"{AT}/iridescenceIor" not in noted(found) and f"{AT}/iridescenceThicknessMaximum" in noted(found)
 
 
 def test_a_thickness_texture_from_zero_is_the_file_s_own(store: AssetStore) -> None:
@@ -98,20 +114,37 @@ def test_a_thickness_texture_from_a_minimum_is_computed(store: AssetStore, least
     assert found.document["textures"][made["film_thickness"]["texture"]]["color_space"] == "linear"
 
 
-def test_a_mask_covers_whole_texels(store: AssetStore) -> None:
+def masked() -> tuple[Gltf, dict[str, Any]]:
     file = Gltf()
     extension = {"iridescenceFactor": 0.8, "iridescenceThicknessMinimum": 0, "iridescenceThicknessMaximum": 500,
                  "iridescenceTexture": {"index": file.texture(DATA)},
                  "iridescenceThicknessTexture": {"index": file.texture(DATA[::-1].copy())}}  # fmt: skip
+    return file, extension
+
+
+def test_a_mask_is_the_weight_of_a_film_on_openpbr(store: AssetStore) -> None:
+    file, extension = masked()
     made, found = film(store, extension, file)
+    weight, thickness = made["thin_film_weight"], made["thin_film_thickness"]
+    assert (weight["channel"], weight["factor"]) == ("r", 0.8)
+    assert np.allclose(1000 * texels(store, found, thickness), SHARES[::-1] * 500) and list(noted(found)) == [AT]
+
+
+def test_a_mask_covers_whole_texels_on_principled(store: AssetStore) -> None:
+    file, extension = masked()
+    made, found = film(store, extension, file, **CUT)
     expected = np.where(0.8 * DATA[..., 0] / 255 >= 0.5, SHARES[::-1] * 500, 0)
     assert 0 < (expected == 0).mean() < 1
     assert np.abs(texels(store, found, made["film_thickness"]) - expected).max() <= 0.5 * 500 / 255 + 1e-6
-    assert "all of a texel or nothing" in noted(found)[f"{AT}/iridescenceTexture"]
+    assert "all of a texel or nothing" in noted(found)[f"{AT}/iridescenceFactor"]
     # A mask alone: the maximum where it covers.
     file = Gltf()
-    made, found = film(store, {"iridescenceFactor": 1, "iridescenceTexture": {"index": file.texture(DATA)}}, file)
+    extension = {"iridescenceFactor": 1, "iridescenceTexture": {"index": file.texture(DATA)}}
+    made, found = film(store, extension, file, **CUT)
     assert np.allclose(texels(store, found, made["film_thickness"]), np.where(DATA[..., 0] >= 128, 400, 0))
+    extension = {"iridescenceFactor": 0.4, "iridescenceTexture": {"index": (file := Gltf()).texture(DATA)}}
+    made, found = film(store, extension, file, **CUT)
+    assert "film_thickness" not in made and "of 0.4 it is left out" in noted(found)[f"{AT}/iridescenceFactor"]
 
 
 def scene(material: dict[str, Any], textures: dict[str, Any]) -> dict[str, Any]:

@@ -309,6 +309,32 @@ def test_what_is_brushed_needs_a_direction(store: AssetStore) -> None:
         assert ("anisotropic" in document) == brushed and bool(found.warnings) != brushed
 
 
+@pytest.mark.parametrize(("factor", "depth", "type"), [(1, 0, "principled"), (0.25, 0, "openpbr"),
+                                                       (0.25, 2, "principled")])  # fmt: skip
+def test_glass_of_one_texture(store: AssetStore, factor: float, depth: float, type: str) -> None:
+    """Colour and alpha of a texture stay its own on either model; openpbr has no tint beside an attenuation, which
+    weighs as much as a part of a film."""
+    file = Gltf()
+    base = {"baseColorTexture": {"index": file.texture(PIXELS)}, "baseColorFactor": [1, 0.5, 1, 0.5]}
+    volume: dict[str, Any] = {"thicknessFactor": 1}
+    if depth:
+        volume |= {"attenuationDistance": depth, "attenuationColor": [1, 0, 0]}
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 0.5}, "KHR_materials_volume": volume,
+        "KHR_materials_iridescence": {"iridescenceFactor": factor},
+    }  # fmt: skip
+    glass = {"pbrMetallicRoughness": base, "extensions": extensions, "alphaMode": "BLEND"}
+    found = imported(store, file.of(glass))
+    (made,) = found.document["materials"].values()
+    opacity = made["geometry_opacity" if type == "openpbr" else "alpha"]
+    assert (made["type"], made["base_color"]["factor"]) == (type, [1, 0.5, 1])
+    assert (opacity["channel"], opacity["factor"]) == ("a", 0.5)
+    if type == "openpbr":
+        assert made["transmission_color"] == made["base_color"] and made["transmission_weight"] == 0.5
+    film = "/materials/0/extensions/KHR_materials_iridescence"
+    assert (f"{film}/iridescenceFactor" in noted(found)) == (factor < 1 and type == "principled")
+
+
 @pytest.mark.parametrize("across", [10497, 33071, 33648])
 @pytest.mark.parametrize("down", [10497, 33071, 33648])
 def test_each_axis_wraps_as_its_sampler_says(store: AssetStore, across: int, down: int) -> None:

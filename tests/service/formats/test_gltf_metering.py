@@ -14,6 +14,7 @@ from PIL import Image
 from service.cli.program import main
 from service.formats.images import read_metadata
 from service.formats.read.gltf.importer import read_scene
+from service.formats.read.scenes import looks
 from service.formats.types import AssetLimits, SceneFile
 from tests.gltf_files import QUAD, Gltf
 from tests.gltf_lights import BLENDER_LAMP, LIGHTS, SUN, looking, plastered, room, start_up, wall
@@ -81,6 +82,19 @@ def test_unlit_and_clear_materials_do_not_count() -> None:
     backdrop = file.mesh(file.primitive({"POSITION": QUAD * 9}, material=file.add("materials", unlit)))
     file.node(mesh=backdrop, matrix=looking([-4, -3, -4], [7, 5, 7]))
     assert read(file).exposure == expected
+
+
+def test_materials_look_alike_from_far_whatever_their_model() -> None:
+    for own, other in (
+        ({"emission": [1.0, 2.0, 0.5], "base_color": [0.5, 0.25, 0.1]},
+         {"emission_luminance": 683.0, "emission_color": [1.0, 2.0, 0.5], "base_color": [0.5, 0.25, 0.1]}),
+        ({"transmission": 0.5}, {"transmission_weight": 0.5}),
+        ({"alpha": 0.5}, {"geometry_opacity": 0.5}),
+        ({}, {"base_color": 1.0}),
+    ):  # fmt: skip
+        pair = {"type": "principled", **own}, {"type": "openpbr", **other}
+        for look in (looks.albedo, looks.emission, looks.is_clear):
+            assert look(pair[0]) == pytest.approx(look(pair[1]))
 
 
 @pytest.mark.parametrize("file", [start_up(BLENDER_LAMP), room()], ids=["start-up", "room"])

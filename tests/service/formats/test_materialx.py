@@ -64,9 +64,9 @@ def texels(store: AssetStore, imported: Imported, reference: dict[str, Any]) -> 
         (
             "UsdPreviewSurface",
             [value("diffuseColor", [0.1, 0.2, 0.3]), value("metallic", 0.25), value("roughness", 0.6),
-             value("ior", 1.33), value("clearcoat", 0.5), value("opacity", 0.25), value("occlusion", 0.5)],
-            {"base_color": [0.775, 0.8, 0.825], "metallic": 0.25, "roughness": 0.6, "ior": 1.33, "clearcoat": 0.5,
-             "clearcoat_roughness": 0.01, "transmission": 0.75},
+             value("ior", 1.33), value("clearcoat", 0.5), value("opacity", 0), value("occlusion", 0.5)],
+            {"base_color": 1.0, "metallic": 0.25, "roughness": 0.6, "ior": 1.33, "clearcoat": 0.5,
+             "clearcoat_roughness": 0.01, "transmission": 1.0},
             {"SM/occlusion"},
         ),
         (

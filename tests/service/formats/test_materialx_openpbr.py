@@ -159,12 +159,19 @@ def test_films_of_standard_surface(store: AssetStore) -> None:
 
 
 def test_a_part_of_a_film_is_all_or_nothing_on_principled(store: AssetStore) -> None:
-    for share, thickness in ((0.3, None), (0.6, 550)):
-        inputs = [value("iridescence", share), value("iridescence_thickness", 550)]
+    """And a part of a film on openpbr, unless that loses more: it has no cut-off."""
+    cut = value("alpha_mode", 1, "integer")
+    for weight, thickness in ((0.3, None), (0.6, 550)):
+        inputs = [value("iridescence", weight), value("iridescence_thickness", 550)]
+        imported = taken(store, mtlx(surface("gltf_pbr", *inputs)))
+        assert material(imported)["thin_film_weight"] == weight and not imported.warnings
+        inputs.append(cut)
         imported = taken(store, mtlx(surface("gltf_pbr", *inputs)))
         assert material(imported).get("film_thickness") == thickness and losses(imported) == {"SM/iridescence"}
     stripes = graph(node("ramplr", "ramp", "float", value("valuel", 0.0), value("valuer", 1.0)), share="ramp float")
-    shader = surface("gltf_pbr", from_graph("iridescence", "share", "float"), value("iridescence_thickness", 550))
+    shader = surface(
+        "gltf_pbr", from_graph("iridescence", "share", "float"), value("iridescence_thickness", 550), cut
+    )
     imported = taken(store, mtlx(stripes, shader))
     thickness = material(imported)["film_thickness"]
     image = store.image(imported.document["textures"][thickness["texture"]]["asset"]).pixels

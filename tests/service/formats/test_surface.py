@@ -53,7 +53,7 @@ class Said(PlainInputs):
         x, y, _ = self.said.get(name, (1.0, 0.0, 0.0))
         return x, y
 
-    def note(self, name: str, detail: str) -> None:
+    def warn(self, name: str, detail: str) -> None:
         self.notes[name] = detail
 
 
@@ -281,7 +281,8 @@ def same(found: dict[str, Any], wanted: dict[str, Any]) -> None:
 def test_what_a_reader_cannot_compute_is_told_and_the_input_serves() -> None:
     """Textures are multiplied by numbers; a mix of two, or a power of one, is computed for .mtlx files alone."""
     said = {"base_color": COLOR, "base": GREY, "transmission": GREY, "specular_anisotropy": GREY}
-    read = Said("standard_surface", said)
+    mine = {"sheen": 1.0, "coat": 1.0, "coat_roughness": 1.0}  # which `principled` has
+    read = Said("standard_surface", {**said, **mine})
     assert read.material["base_color"] == COLOR and "itself is used" in read.notes["base_color"]
     assert read.material["anisotropic"]["factor"] == pytest.approx(0.5 / 0.9), "below 0.98 it is a product"
     whole = {**GREY, "factor": 1.0}

@@ -1,4 +1,4 @@
-"""A USD file as a scene: what `make test` tries; the others are `test_usd_scene` and `test_usd_materials`."""
+"""A USD file as a scene: what `make test` tries; `test_usd_scene`, `_materials` and `_materialx` try more."""
 
 from __future__ import annotations
 

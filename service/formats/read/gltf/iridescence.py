@@ -1,4 +1,4 @@
-"""The weight and the thickness of KHR_materials_iridescence, computed texel by texel where textures say them."""
+"""The thickness of KHR_materials_iridescence, computed texel by texel where textures say them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,10 @@ MOST, LEAST, THICKEST = 400.0, 100.0, 1e4  # nm: the extension's defaults, and t
 LARGEST = 4096  # texels a side of a computed image
 
 
-def weight(read: MaterialReader, place: JsonView) -> float:
-    """1 where a texture says which texels the film covers: their thickness is made 0 elsewhere."""
-    found = place.number("iridescenceFactor", 0, 0, 1)
-    is_masked = found >= HALF and read.texture(place, "iridescenceTexture") is not None
-    return 1.0 if is_masked else found
-
-
-def thickness(read: MaterialReader, place: JsonView) -> Any:
-    """In nm: a number, or a texture."""
-    share, mask = place.number("iridescenceFactor", 0, 0, 1), read.texture(place, "iridescenceTexture")
+def thickness(read: MaterialReader, place: JsonView, is_masked: bool = False) -> Any:
+    """In nm: a number, or a texture; with the mask, 0 where the film covers less than half of the surface."""
+    share = place.number("iridescenceFactor", 0, 0, 1)
+    mask = read.texture(place, "iridescenceTexture") if is_masked else None
     texture = read.texture(place, "iridescenceThicknessTexture")
     most = _nanometres(read, place, "iridescenceThicknessMaximum", MOST)
     if texture is None and mask is None:
@@ -35,9 +29,6 @@ def thickness(read: MaterialReader, place: JsonView) -> Any:
         return 0.0
     if mask is None and least == 0:
         return {"texture": texture, "channel": "g", "factor": most}
-    if mask is not None:
-        detail = "a film covers all of a texel or nothing here: all where the factor times the texture is 0.5 or more"
-        read.notes.add(place.at("iridescenceTexture"), detail)
     return _baked(read, place, (share, least, most), (mask, texture))
 
 

@@ -12,6 +12,7 @@ from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.surface.gltf import BLEND, DEFAULTS, MASK, OPAQUE
 from service.formats.surface.gltf_members import GLOSSY, ROUGH, ROWS, Row
 from service.formats.surface.plain import Default, Given, PlainInputs
+from service.formats.surface.trees import Tree
 from service.formats.types import LARGEST
 
 MODES = {"OPAQUE": OPAQUE, "MASK": MASK, "BLEND": BLEND}
@@ -49,9 +50,10 @@ class MaterialInputs(PlainInputs):
 
     def is_textured(self, name: str) -> bool:
         row, owner = self._found(name)
-        if owner is None or row.texture not in owner or name == "iridescence":  # whose mask is in the thickness
+        if owner is None or row.texture not in owner:
             return False
-        found = _factor(owner, row, self.defaults[name])
+        default = (1.0,) * 4 if name in ("base_color", "alpha") else self.defaults[name]
+        found = _factor(owner, row, default)
         return max(found) > 0 if isinstance(found, tuple) else found > 0
 
     def bump(self, name: str) -> dict[str, Any] | None:
@@ -70,7 +72,14 @@ class MaterialInputs(PlainInputs):
             return None
         return {"texture": texture} | ({"scale": scale} if scale != 1 else {})
 
-    def note(self, name: str, detail: str) -> None:
+    def masked(self, name: str, mask: str) -> Tree:
+        """Of a film alone, whose image is computed."""
+        owner = self._found(mask)[1]
+        if self.is_trial or owner is None:
+            return self.tree(name)
+        return self.made_tree(iridescence.thickness(self.read, owner, is_masked=True), self.defaults[name])
+
+    def warn(self, name: str, detail: str) -> None:
         row, owner = self._found(name)
         if owner is not None:
             self.read.notes.add(owner.at(row.factor or row.texture), detail)
@@ -139,6 +148,5 @@ _SPECIAL: dict[str, Callable[[MaterialReader, JsonView], Given]] = {
     "alpha_mode": _alpha_mode,
     "anisotropy_strength": _strength,
     "anisotropy_rotation": _rotation,
-    "iridescence": iridescence.weight,
     "iridescence_thickness": iridescence.thickness,
 }

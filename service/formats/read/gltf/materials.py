@@ -1,4 +1,4 @@
-"""glTF's materials as the contract's `principled`, or as bare emission where they are unlit."""
+"""glTF's materials as `principled` or `openpbr`, or as bare emission where they are unlit."""
 
 from __future__ import annotations
 
@@ -65,16 +65,18 @@ class Materials:
             inputs = MaterialInputs(read)
             gltf.gltf_pbr(inputs)
             self._tell(read, inputs.material)
-        if "emission" in inputs.material and read.place.flag("doubleSided"):
+        shines = not inputs.material.keys().isdisjoint(("emission", "emission_luminance"))
+        if shines and read.place.flag("doubleSided"):
             inputs.material["emission_sides"] = "both"
         return inputs.material
 
     def _tell(self, read: MaterialReader, material: dict[str, Any]) -> None:
         """Warn of what the inputs do not say."""
         film, volume = read.owner("iridescence"), read.owner("volume")
-        if film is not None and "film_thickness" in material:
+        if film is not None and not material.keys().isdisjoint(("film_thickness", "thin_film_weight")):
             self.notes.add(film.pointer, OTHER_HUES)
-        is_body = "transmission" in material and "thin_walled" not in material
+        is_glass = not material.keys().isdisjoint(("transmission", "transmission_weight"))
+        is_body = is_glass and material.keys().isdisjoint(("thin_walled", "geometry_thin_walled"))
         if volume is not None and "thicknessTexture" in volume and is_body:
             detail = "the thickness texture is not used; rays go through the geometry itself"
             self.notes.add(volume.at("thicknessTexture"), detail)

@@ -78,7 +78,7 @@ class Surface(Inputs):
             bends = "normal_map" in self.material or "geometry_normal" in self.material
             self.material["height"] = found | ({"shading": False} if bends else {})
 
-    def note(self, name: str, detail: str) -> None:
+    def warn(self, name: str, detail: str) -> None:
         self.graphs.notes.add(self._place(name), detail)
 
     def _place(self, name: str) -> str:

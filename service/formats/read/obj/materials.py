@@ -84,7 +84,7 @@ class _Inputs(PlainInputs):
     def bump(self, name: str) -> dict[str, Any] | None:
         return None  # which is read by its image, as heights are
 
-    def note(self, name: str, detail: str) -> None:
+    def warn(self, name: str, detail: str) -> None:
         self.notes.add(self.mtl.places.get(name, self.mtl.place), detail)
 
     def scale(self, factor: Any) -> dict[str, Any]:

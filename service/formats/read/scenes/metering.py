@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from service.colorimetry import LUMINANCE
+from service.formats.read.scenes import looks
 from service.formats.read.scenes.rays import Hit, Placed, Scene
 from service.formats.types import Doubles
 
@@ -24,8 +25,6 @@ MIDDLE_GREY = 0.18
 FAR = 4.0  # stops from middle grey up to which a picture stays as its author lit it: means from 0.011 to 2.9
 FEWEST = 6  # rays that must hit something lit: fewer say nothing about the picture
 SHADOWED = 4  # lights, the brightest ones at a place, for which shadow rays are traced
-TEXTURE = 0.3  # the assumed mean of an image
-BLACKEST, WHITEST = 0.04, 0.9  # reflectances: black plastic shines, and nothing reflects everything
 
 
 def exposure(document: dict[str, Any], placed: list[Placed], aspect: float | None) -> float | None:
@@ -34,7 +33,7 @@ def exposure(document: dict[str, Any], placed: list[Placed], aspect: float | Non
     `document` is a scene's: its camera, lights and materials are used. `aspect`: the picture's width over its height.
     """
     materials = document["materials"]
-    solid = [one for one in placed if not _is_clear(materials[one.material])]
+    solid = [one for one in placed if not looks.is_clear(materials[one.material])]
     scene, found = Scene(solid or placed), _Metered(document)
     camera = document["camera"]
     for origin, direction in zip(*_rays(camera, aspect or 1.0), strict=True):
@@ -64,8 +63,8 @@ class _Metered:
         material = self._materials[hit.placed.material]
         if material["type"] == "diffuse":  # unlit: as bright in any light
             return
-        self._albedo.append(_albedo(material))
-        self._emitted.append(_emission(material))
+        self._albedo.append(looks.albedo(material))
+        self._emitted.append(looks.emission(material))
         self._direct.append(self._irradiance(scene, point, hit.normal))
         direction = _scattered(len(self._albedo), hit.normal)
         second, reflected = scene.nearest(point, direction), 0.0
@@ -73,7 +72,7 @@ class _Metered:
             self._closed += 1
             other = self._materials[second.placed.material]
             irradiance = self._irradiance(scene, point + second.distance * direction, second.normal)
-            reflected = _albedo(other) * irradiance + math.pi * _emission(other)
+            reflected = looks.albedo(other) * irradiance + math.pi * looks.emission(other)
         self._reflected.append(reflected)
 
     def luminances(self) -> Doubles:
@@ -141,24 +140,3 @@ def _scattered(number: int, normal: Doubles) -> Doubles:
     z, turn = 1 - 2 * u, 2 * math.pi * v
     radius = math.sqrt(max(1 - z * z, 0.0))
     return np.asarray(normal + 0.999 * np.array([radius * math.cos(turn), radius * math.sin(turn), z]))
-
-
-def _is_clear(material: dict[str, Any]) -> bool:
-    return bool(material.get("transmission")) or "alpha" in material
-
-
-def _albedo(material: dict[str, Any]) -> float:
-    if material["type"] == "diffuse":  # unlit
-        return 0.0
-    return min(max(_mean(material.get("base_color", 1.0)), BLACKEST), WHITEST)
-
-
-def _emission(material: dict[str, Any]) -> float:
-    return _mean(material.get("emission", 0.0))
-
-
-def _mean(value: Any) -> float:
-    """The luminance of a colour of a document."""
-    if isinstance(value, dict):
-        return TEXTURE * _mean(value.get("factor", 1.0))
-    return float(LUMINANCE @ value) if isinstance(value, list | tuple) else float(value)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from service.formats.read.scenes import looks
 from service.formats.read.scenes.framing import Bounds
 from service.formats.read.scenes.rays import Hit, Placed, Scene
 from service.formats.types import Doubles
@@ -46,7 +47,7 @@ def stand_inside(document: Document, placed: list[Placed], bounds: Bounds, has_c
     camera = None if has_camera else _camera(scene, bounds)
     if camera is not None:
         document["camera"] = camera
-    if document.get("lights") or any(material.get("emission") for material in document["materials"].values()):
+    if document.get("lights") or any(looks.emission(material) > 0 for material in document["materials"].values()):
         return None if camera is None else "the model is a closed room: the camera stands inside"
     document["lights"] = [_lamp(scene, document["camera"], bounds)]
     done = "a lamp is added" if camera is None else "the camera stands inside, and a lamp is added"

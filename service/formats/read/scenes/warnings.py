@@ -29,6 +29,14 @@ class Warnings:
         else:
             self._unlisted += 1
 
+    def take(self, others: Warnings) -> None:
+        """Add all of others."""
+        for detail, places in others._places.items():
+            for pointer in [others._first[detail], *sorted(places)]:
+                self.add(pointer, detail)
+        self._unlisted += others._unlisted
+        self._omissions |= others._omissions
+
     def leave_out(self, pointer: str, detail: str) -> None:
         """Add a warning that says why something is not in the picture."""
         self.add(pointer, detail)

@@ -79,7 +79,7 @@ class _Importer:
             "camera": found or framed(around),
             "environment": self.lights.environment,
             "lights": lights,
-            "textures": self.textures.documents,
+            "textures": self.materials.shown,
             "materials": self.materials.documents,
             "shapes": shapes + [lamp.shape for lamp in lamps],
         }

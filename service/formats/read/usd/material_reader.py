@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.read.scenes.warnings import Warnings
@@ -10,7 +10,7 @@ from service.formats.read.usd.networks import MOST_STEPS, Node
 from service.formats.read.usd.pictures import materialx_picture, picture
 from service.formats.read.usd.textures import Picture, Role, Textures
 from service.formats.surface import Model
-from service.formats.surface.inputs import COLORS
+from service.formats.surface.inputs import COLORS, PART
 from service.formats.surface.plain import Default, Given, PlainInputs
 
 MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's modes of opacity
@@ -29,18 +29,36 @@ class Edge:
     detail: str
 
 
+@dataclass
+class Uses:
+    """What a material uses of its meshes, and what is lost on those that leave an image. Trials of a reading share
+    it."""
+
+    charts: list[str] = field(default_factory=list)
+    is_colored: bool = False
+    edges: list[Edge] = field(default_factory=list)
+    unread: int = 0  # images and other nodes
+
+
 class Reader(PlainInputs):
-    """The inputs of one surface. `charts` and `is_colored` say what of its meshes it uses, `edges` what is lost on
-    those that leave an image."""
+    """The inputs of one surface."""
 
     def __init__(self, surface: Node, model: Model, textures: Textures, unit: float, notes: Warnings) -> None:
         super().__init__(model.defaults)
         self.surface, self.textures, self.unit, self.notes = surface, textures, unit, notes
-        self.charts: list[str] = []
-        self.edges: list[Edge] = []
-        self.is_colored = False
+        self.uses = Uses()
         self._unread = surface  # the node of MaterialX at which reading ended
         model.read(self)
+
+    @property
+    def all_lost(self) -> float:
+        """What the losses weigh, with what its inputs are connected to."""
+        return self.lost + PART * self.uses.unread
+
+    @property
+    def said(self) -> int:
+        """How many inputs the file says anything about."""
+        return sum(self.surface.has(name) for name in self.defaults)
 
     @property
     def document(self) -> dict[str, Any]:
@@ -73,7 +91,7 @@ class Reader(PlainInputs):
         read = self._read(found, "normal", ())
         return read if isinstance(read, dict) else None
 
-    def note(self, name: str, detail: str) -> None:
+    def warn(self, name: str, detail: str) -> None:
         self.notes.add(self.surface.at(name), detail)
 
     def _materialx(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
@@ -105,9 +123,11 @@ class Reader(PlainInputs):
         return self._materialx(inner, role, steps + 1)
 
     def _use(self, picture: Picture, role: Role) -> dict[str, Any] | None:
-        found = self.textures.use(picture, role, self.charts)
-        if found is not None:
-            self.edges += [Edge(picture.chart, dict(picture.placing), *edge) for edge in picture.edges]
+        found = self.textures.use(picture, role, self.uses.charts)
+        if found is None:
+            self.uses.unread += 1
+        else:
+            self.uses.edges += [Edge(picture.chart, dict(picture.placing), *edge) for edge in picture.edges]
         return found
 
     def _product(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
@@ -135,7 +155,7 @@ class Reader(PlainInputs):
         if node.kind.startswith("UsdPrimvarReader_float"):
             varname = str(node.value("varname", ""))
             if varname == "displayColor" and role == "color":
-                self.is_colored = True
+                self.uses.is_colored = True
                 return (1.0, 1.0, 1.0)
             self.notes.add(node.pointer, f"values of the primvar {varname[:40]!r} are not supported in a material")
             fallback = node.value("fallback", default)
@@ -146,6 +166,7 @@ class Reader(PlainInputs):
             if read is not None:
                 return read
             node = self._unread
+        self.uses.unread += 1
         what = node.kind[:60] or "a node without a kind"
         self.notes.add(node.pointer, f"{what} is not supported in a material; the parameter has its default")
         return default

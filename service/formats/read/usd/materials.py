@@ -13,6 +13,7 @@ from service.formats.read.usd.material_reader import Edge, Reader
 from service.formats.read.usd.networks import Node, surface_of
 from service.formats.read.usd.textures import Textures
 from service.formats.surface import MODELS
+from service.formats.surface.choice import rich_is_better
 
 PREVIEW = "UsdPreviewSurface"
 RICH = {f"ND_{name}_surfaceshader": MODELS[name] for name in ("standard_surface", "open_pbr_surface", "gltf_pbr")}
@@ -60,7 +61,7 @@ class Materials:
                 return None
             name = unique(material.GetPrim().GetName(), self.documents)
             self.documents[name] = read.document
-            self._bound[key] = Bound(name, tuple(read.charts), read.is_colored, tuple(read.edges))
+            self._bound[key] = Bound(name, tuple(read.uses.charts), read.uses.is_colored, tuple(read.uses.edges))
         return self._bound[key]
 
     def plain(self, color: list[float] | None, is_colored: bool) -> Bound:
@@ -74,6 +75,13 @@ class Materials:
             self._colors[key] = Bound(name, (), is_colored)
         return self._colors[key]
 
+    @property
+    def shown(self) -> dict[str, dict[str, Any]]:
+        """The textures that a material shows: those of a surface that another one replaces are left out."""
+        values = [value for one in self.documents.values() for value in one.values() if isinstance(value, dict)]
+        names = {value.get("texture") for value in values}
+        return {name: found for name, found in self.textures.documents.items() if name in names}
+
     def _read(self, material: UsdShade.Material) -> Reader | None:
         """MaterialX first, which says more; the preview's surface where it loses less."""
         preview, rich = surface_of(material, "", self.time), surface_of(material, "mtlx", self.time)
@@ -81,12 +89,18 @@ class Materials:
             preview, rich = None, preview
         fallback = preview if preview is not None and preview.kind == PREVIEW else None
         if rich is not None and rich.kind in RICH:
-            lost = Warnings()
-            read = Reader(rich, RICH[rich.kind], self.textures, self.unit, lost if fallback else self.notes)
-            if fallback is None or not lost.document():
+            notes, others = Warnings(), Warnings()
+            read = Reader(rich, RICH[rich.kind], self.textures, self.unit, notes)
+            plain = None
+            if fallback is not None and read.all_lost > 0:
+                plain = Reader(fallback, MODELS[PREVIEW], self.textures, self.unit, others)
+            if plain is None or rich_is_better(read.all_lost, plain.all_lost, read.said - plain.said):
+                self.notes.take(notes)
                 return read
             detail = "the MaterialX surface has what is not supported; its UsdPreviewSurface is shown instead"
             self.notes.add(rich.pointer, detail)
+            self.notes.take(others)
+            return plain
         if fallback is not None:
             return Reader(fallback, MODELS[PREVIEW], self.textures, self.unit, self.notes)
         other: Node | None = rich or preview
