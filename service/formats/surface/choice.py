@@ -7,6 +7,7 @@ the one whose losses weigh least is read; of equal ones the first.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 
 from service.formats.surface.inputs import Inputs
 
@@ -18,13 +19,20 @@ def read_best(s: Inputs, *readings: Reading) -> None:
     """Read the inputs as the material that loses least of them."""
     weights = []
     for reading in readings:
-        trial = s.trial()
+        trial = copy(s)
+        trial.material, trial.losses, trial.is_trial = dict(s.material), {}, True
         reading(trial)
-        weights.append(trial.lost)
+        weights.append(lost(trial))
     readings[weights.index(min(weights))](s)
 
 
-def rich_is_better(lost: float, plain_lost: float, more: int) -> bool:
-    """True if the richer of two surfaces that a material has loses less than the plain one, which it says `more`
-    inputs than."""
-    return lost <= plain_lost + UNSAID * max(more, 0)
+def lost(s: Inputs) -> float:
+    """What all losses of a reading weigh."""
+    return sum(s.losses.values())
+
+
+def rich_is_better(rich: float, plain: float, more: int) -> bool:
+    """True if the richer of two surfaces of a material, which says `more` inputs than the plain one, loses less.
+
+    `rich` and `plain` are what their losses weigh."""
+    return rich <= plain + UNSAID * max(more, 0)

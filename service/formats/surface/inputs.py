@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from copy import copy
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -47,22 +46,11 @@ class Inputs(ABC):
     def __init__(self) -> None:
         self.material: dict[str, Any] = {"type": "principled"}
         self.is_trial = False  # it only finds out what would be lost: nothing is warned of and no image is made
-        self._losses: dict[tuple[str, str], float] = {}
-
-    def trial(self) -> Self:
-        """A copy that only finds out what a reading of it would lose."""
-        made = copy(self)
-        made.material, made._losses, made.is_trial = dict(self.material), {}, True
-        return made
-
-    @property
-    def lost(self) -> float:
-        """The sum of what the losses weigh."""
-        return sum(self._losses.values())
+        self.losses: dict[tuple[str, str], float] = {}  # what each weighs, by its input and its words
 
     def note(self, name: str, detail: str, weight: float = LOST) -> None:
         """Warn of a loss at the place of an input."""
-        self._losses[name, detail] = weight
+        self.losses[name, detail] = weight
         if not self.is_trial:
             self.warn(name, detail)
 
@@ -167,7 +155,7 @@ class Inputs(ABC):
         low, high = RANGES.get(parameter, (0.0, 1.0))
         try:
             if self.is_trial and self.computes:
-                value = self._tried(tree, name, low, high)
+                value = _tried(self, tree, name, low, high)
             else:
                 value = self.value(tree, name, low, high, is_color=parameter in COLORS)
         except Unsupported as problem:
@@ -178,17 +166,6 @@ class Inputs(ABC):
             return
         if default is None or isinstance(value, dict | list) or abs(value - default) > 1e-6:
             self.material[parameter] = value
-
-    def _tried(self, tree: Tree, name: str, low: float, high: float) -> Any:
-        """What `value` would give, without an image that takes long to compute."""
-        found = self.fixed(tree)
-        if found is None:
-            return {}
-        inside = np.clip(found, low, high)
-        if np.abs(inside - found).max() > 1e-6:
-            self.note(name, f"values beyond {low:g}..{high:g}")
-        numbers = [float(one) for one in inside]
-        return numbers[0] if len(set(numbers)) == 1 else numbers
 
     def normal(self, parameter: str, name: str) -> None:
         if self.is_trial:
@@ -212,3 +189,15 @@ class Inputs(ABC):
         turned = [round(one / length, 6) + 0.0 for one in (c * x - s * y, s * x + c * y)]
         if turned != [1.0, 0.0]:
             self.material[parameter] = [*turned, 0.0]
+
+
+def _tried(s: Inputs, tree: Tree, name: str, low: float, high: float) -> Any:
+    """What `value` would give, without an image that takes long to compute."""
+    found = s.fixed(tree)
+    if found is None:
+        return {}
+    inside = np.clip(found, low, high)
+    if np.abs(inside - found).max() > 1e-6:
+        s.note(name, f"values beyond {low:g}..{high:g}")
+    numbers = [float(one) for one in inside]
+    return numbers[0] if len(set(numbers)) == 1 else numbers

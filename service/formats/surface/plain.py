@@ -46,20 +46,8 @@ class PlainInputs(Inputs):
     def tree(self, name: str) -> Tree:
         if name not in self._trees:
             default = self.defaults[name]
-            self._trees[name] = self.made_tree(self.given(name, default), default)
+            self._trees[name] = tree_of(self.given(name, default), default)
         return self._trees[name]
-
-    def made_tree(self, found: Given | None, default: Default) -> Tree:
-        """The tree of what `given` says."""
-        size = 3 if isinstance(default, tuple) else 1
-        if isinstance(found, dict):
-            reference = dict(found)
-            factor = reference.pop("factor", 1.0)
-            by = constant(*factor) if isinstance(factor, list) else constant(factor)
-            return times(Texture("texture", size, reference=reference), by)
-        plain = default if found is None else found
-        numbers = plain if isinstance(plain, tuple) else (plain or 0.0,) * size
-        return constant(*numbers[:size])
 
     def constant(self, name: str) -> list[float] | None:
         return None if self.is_textured(name) else super().constant(name)
@@ -81,22 +69,18 @@ class PlainInputs(Inputs):
     def value(self, tree: Tree, name: str, low: float, high: float, is_color: bool) -> Any:
         found = self.fixed(tree)
         if found is not None:
-            return self._number(self._within(found, name, low, high), is_color)
+            return _number(self._within(found, name, low, high), is_color)
         texture, *others = _textures(tree)
         by = None if others else _factors(tree, texture)
         if by is None:
             raise Unsupported("what is computed of its textures is not supported")
         if not np.abs(by).max():
-            return self._number(by, is_color)
-        return texture.reference | self.scale(self._number(self._within(by, name, 0.0, high), is_color))
+            return _number(by, is_color)
+        return texture.reference | self.scale(_number(self._within(by, name, 0.0, high), is_color))
 
     def scale(self, factor: Any) -> dict[str, Any]:
         """The member of a reference that says its factor."""
         return {} if factor == 1 else {"factor": factor}
-
-    def _number(self, values: Any, is_color: bool) -> Any:
-        numbers = [float(one) for one in values]
-        return numbers[0] if not is_color or len(set(numbers)) == 1 else numbers
 
     def _within(self, values: Any, name: str, low: float, high: float) -> Any:
         if not np.isfinite(values).all():
@@ -106,6 +90,24 @@ class PlainInputs(Inputs):
             nearest = ", ".join(f"{one:g}" for one in sorted(set(inside[inside != values].tolist())))
             self.note(name, f"values beyond {low:g}..{high:g} are not supported; {nearest} is used instead")
         return inside
+
+
+def tree_of(found: Given | None, default: Default) -> Tree:
+    """The tree of what `given` says."""
+    size = 3 if isinstance(default, tuple) else 1
+    if isinstance(found, dict):
+        reference = dict(found)
+        factor = reference.pop("factor", 1.0)
+        by = constant(*factor) if isinstance(factor, list) else constant(factor)
+        return times(Texture("texture", size, reference=reference), by)
+    plain = default if found is None else found
+    numbers = plain if isinstance(plain, tuple) else (plain or 0.0,) * size
+    return constant(*numbers[:size])
+
+
+def _number(values: Any, is_color: bool) -> Any:
+    numbers = [float(one) for one in values]
+    return numbers[0] if not is_color or len(set(numbers)) == 1 else numbers
 
 
 def _textures(tree: Tree) -> list[Texture]:

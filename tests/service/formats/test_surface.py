@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -17,44 +17,12 @@ from service.formats import types
 from service.formats.read.materialx.importer import read_materialx
 from service.formats.surface import MODELS, gltf, open_pbr, outputs
 from service.formats.surface.outputs import Outputs, plain
-from service.formats.surface.plain import Default, Given, PlainInputs
 from service.formats.types import AssetLimits
 from tests import mtlx_files
+from tests.surface_inputs import COLOR, GREY, Said
 
-GREY = {"texture": "t", "channel": "g", "factor": 0.5}
-COLOR = {"texture": "t", "factor": [0.5, 0.25, 0.125]}
 MAP = {"texture": "t", "scale": 0.5}
 OF_GLTF_ALONE = ("diffuse_transmission", "diffuse_transmission_color")
-
-
-class Said(PlainInputs):
-    """The inputs of a model, as a dictionary has them; `notes` are the warnings by their inputs."""
-
-    def __init__(self, model: str, said: Mapping[str, Any]) -> None:
-        super().__init__(MODELS[model].defaults)
-        self.said, self.notes = said, dict[str, str]()
-        MODELS[model].read(self)
-
-    def given(self, name: str, default: Default) -> Given | None:
-        found = self.said.get(name)
-        return tuple(found) if isinstance(found, list) else found
-
-    def is_given(self, name: str) -> bool:
-        return name in self.said
-
-    def is_textured(self, name: str) -> bool:
-        return isinstance(self.said.get(name), dict)
-
-    def bump(self, name: str) -> dict[str, Any] | None:
-        found = self.said.get(name)
-        return found if isinstance(found, dict) else None
-
-    def direction(self, name: str) -> tuple[float, float] | None:
-        x, y, _ = self.said.get(name, (1.0, 0.0, 0.0))
-        return x, y
-
-    def warn(self, name: str, detail: str) -> None:
-        self.notes[name] = detail
 
 
 def test_defaults_are_those_of_the_library() -> None:

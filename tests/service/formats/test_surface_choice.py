@@ -9,7 +9,7 @@ import pytest
 from service.document.material import OpenpbrMaterial, PrincipledMaterial
 from service.formats.surface import MODELS, choice, gltf
 from service.formats.surface.inputs import Inputs
-from tests.service.formats.test_surface import COLOR, GREY, Said
+from tests.surface_inputs import COLOR, GREY, Said
 
 HALF, RED = [0.5, 0.5, 0.5], [1.0, 0.25, 0.125]
 PARTLY = {"transmission": 0.3, "base_color": HALF}
@@ -102,12 +102,12 @@ def test_a_trial_warns_of_nothing_and_changes_nothing() -> None:
         s.material["type"] = "first"
         s.note("base", "one")
         s.note("base", "another", 0.25)
-        lost["first"] = s.lost
+        lost["first"] = choice.lost(s)
 
     def second(s: Inputs) -> None:
         s.material["type"] = "second"
         s.note("base", "other", 1.25)
-        lost["second"] = s.lost
+        lost["second"] = choice.lost(s)
 
     read = Probe("standard_surface", {})
     choice.read_best(read, first, second)

@@ -11,7 +11,7 @@ from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.surface.gltf import BLEND, DEFAULTS, MASK, OPAQUE
 from service.formats.surface.gltf_members import GLOSSY, ROUGH, ROWS, Row
-from service.formats.surface.plain import Default, Given, PlainInputs
+from service.formats.surface.plain import Default, Given, PlainInputs, tree_of
 from service.formats.surface.trees import Tree
 from service.formats.types import LARGEST
 
@@ -77,7 +77,7 @@ class MaterialInputs(PlainInputs):
         owner = self._found(mask)[1]
         if self.is_trial or owner is None:
             return self.tree(name)
-        return self.made_tree(iridescence.thickness(self.read, owner, is_masked=True), self.defaults[name])
+        return tree_of(iridescence.thickness(self.read, owner, is_masked=True), self.defaults[name])
 
     def warn(self, name: str, detail: str) -> None:
         row, owner = self._found(name)
@@ -93,7 +93,7 @@ class MaterialInputs(PlainInputs):
         return (Row("", ""), None) if row is None else (row, self.read.owner(row.extension))
 
 
-def _factor(owner: JsonView, row: Row, default: Default) -> float | tuple[float, ...]:
+def _factor(owner: JsonView, row: Row, default: Default | tuple[float, ...]) -> float | tuple[float, ...]:
     if row.factor not in owner:
         return default or 0.0
     if isinstance(default, tuple):

@@ -10,7 +10,7 @@ from service.formats.read.usd.networks import MOST_STEPS, Node
 from service.formats.read.usd.pictures import materialx_picture, picture
 from service.formats.read.usd.textures import Picture, Role, Textures
 from service.formats.surface import Model
-from service.formats.surface.inputs import COLORS, PART
+from service.formats.surface.inputs import COLORS
 from service.formats.surface.plain import Default, Given, PlainInputs
 
 MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's modes of opacity
@@ -39,6 +39,15 @@ class Uses:
     edges: list[Edge] = field(default_factory=list)
     unread: int = 0  # images and other nodes
 
+    def texture(self, textures: Textures, picture: Picture, role: Role) -> dict[str, Any] | None:
+        """A parameter's reference to the texture of a picture; None where it cannot be used."""
+        found = textures.use(picture, role, self.charts)
+        if found is None:
+            self.unread += 1
+        else:
+            self.edges += [Edge(picture.chart, dict(picture.placing), *edge) for edge in picture.edges]
+        return found
+
 
 class Reader(PlainInputs):
     """The inputs of one surface."""
@@ -49,16 +58,6 @@ class Reader(PlainInputs):
         self.uses = Uses()
         self._unread = surface  # the node of MaterialX at which reading ended
         model.read(self)
-
-    @property
-    def all_lost(self) -> float:
-        """What the losses weigh, with what its inputs are connected to."""
-        return self.lost + PART * self.uses.unread
-
-    @property
-    def said(self) -> int:
-        """How many inputs the file says anything about."""
-        return sum(self.surface.has(name) for name in self.defaults)
 
     @property
     def document(self) -> dict[str, Any]:
@@ -101,7 +100,7 @@ class Reader(PlainInputs):
         if steps > MOST_STEPS:
             return None
         if kind.startswith(("image_", "tiledimage_")):
-            found = self._use(materialx_picture(node, role, self.notes), role)
+            found = self.uses.texture(self.textures, materialx_picture(node, role, self.notes), role)
             default = node.value("default", 0.0)
             plain = default if isinstance(default, tuple) else (float(default),) * 3
             return found or (plain if node.has("default") else None)
@@ -122,14 +121,6 @@ class Reader(PlainInputs):
             return {**split, "channel": output} if isinstance(split, dict) and output in "rgba" else split
         return self._materialx(inner, role, steps + 1)
 
-    def _use(self, picture: Picture, role: Role) -> dict[str, Any] | None:
-        found = self.textures.use(picture, role, self.uses.charts)
-        if found is None:
-            self.uses.unread += 1
-        else:
-            self.uses.edges += [Edge(picture.chart, dict(picture.placing), *edge) for edge in picture.edges]
-        return found
-
     def _product(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
         """An image times a constant."""
         sides = [node.input(name, 1.0) for name in ("in1", "in2")]
@@ -149,7 +140,7 @@ class Reader(PlainInputs):
     def _read(self, node: Node, role: Role, default: tuple[float, ...]) -> dict[str, Any] | tuple[float, ...]:
         """A reference to the texture that a node is, or its fallback, or `default`."""
         if node.kind == "UsdUVTexture":
-            found = self._use(picture(node, self.notes), role)
+            found = self.uses.texture(self.textures, picture(node, self.notes), role)
             fallback = node.numbers("fallback", (0.0, 0.0, 0.0, 1.0))
             return found or (fallback if node.has("fallback") else default)
         if node.kind.startswith("UsdPrimvarReader_float"):

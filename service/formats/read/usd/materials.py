@@ -13,7 +13,8 @@ from service.formats.read.usd.material_reader import Edge, Reader
 from service.formats.read.usd.networks import Node, surface_of
 from service.formats.read.usd.textures import Textures
 from service.formats.surface import MODELS
-from service.formats.surface.choice import rich_is_better
+from service.formats.surface.choice import lost, rich_is_better
+from service.formats.surface.inputs import PART
 
 PREVIEW = "UsdPreviewSurface"
 RICH = {f"ND_{name}_surfaceshader": MODELS[name] for name in ("standard_surface", "open_pbr_surface", "gltf_pbr")}
@@ -92,9 +93,9 @@ class Materials:
             notes, others = Warnings(), Warnings()
             read = Reader(rich, RICH[rich.kind], self.textures, self.unit, notes)
             plain = None
-            if fallback is not None and read.all_lost > 0:
+            if fallback is not None and _lost(read) > 0:
                 plain = Reader(fallback, MODELS[PREVIEW], self.textures, self.unit, others)
-            if plain is None or rich_is_better(read.all_lost, plain.all_lost, read.said - plain.said):
+            if plain is None or rich_is_better(_lost(read), _lost(plain), _said(read) - _said(plain)):
                 self.notes.take(notes)
                 return read
             detail = "the MaterialX surface has what is not supported; its UsdPreviewSurface is shown instead"
@@ -110,3 +111,13 @@ class Materials:
         )
         self.notes.add(str(material.GetPath()), detail)
         return None
+
+
+def _lost(read: Reader) -> float:
+    """What the losses of a surface weigh, with those of what its inputs are connected to."""
+    return lost(read) + PART * read.uses.unread
+
+
+def _said(read: Reader) -> int:
+    """How many inputs the file says anything about."""
+    return sum(read.surface.has(name) for name in read.defaults)
