@@ -42,7 +42,7 @@ void main() {
         budget_begin();
         Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         bool meets = budget_lasts() && hit.id != NONE;
-        uint shape = meets ? (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u : NONE;
+        uint shape = meets ? (at.shape & ~SHAPE_BITS) + 1u : NONE;
         uint material = meets ? at.material + 1u : NONE;
         COVER_COUNT(shape_covers, slot, shape)
         COVER_COUNT(material_covers, slot, material)

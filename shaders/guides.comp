@@ -33,7 +33,7 @@ void main() {
         Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         if (!budget_lasts()) hit.id = NONE;
         if (uniforms.sample_first + i == 0u) {
-            uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
+            uint shape = (at.shape & ~SHAPE_BITS) + 1u;
             hits[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
         if (hit.id != NONE) {

@@ -88,8 +88,8 @@ void main() {
         vec3 o, d;
         Sampler rng = sobol_begin(pixel, first + i, replicate);
         camera_ray(pixel, rng, o, d);
-#if HAS_ORTHOGRAPHIC && HAS_ATTENUATION
-        if (uniforms.camera.kind == CAMERA_ORTHOGRAPHIC) { // its rays begin at many places
+#if HAS_ATTENUATION
+        if (camera_is_wide()) {
             budget_begin();
             medium = medium_at(o);
         }

@@ -2,6 +2,8 @@
 
 flag            what is known of a flag
 flag_table      a row for each flag: what needs it, and which sliders raise it
+shape_kinds     a row for each kind of shapes' records
+light_kinds     a row for each kind of light
 caustics        what paths of light begin with: lights, and targets that mirror or refract
 media           what fills a scene's bodies, and the space around them
 deltas          which materials are perfectly specular

@@ -10,6 +10,10 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels.deltas import may_be_specular, throws_caustics
+from gpu.kernels.light_kinds import KINDS as LIGHTS
+from gpu.kernels.light_kinds import OF_SHAPES, POINTS
+from gpu.kernels.shape_kinds import KINDS as SHAPES
+from gpu.kernels.shape_kinds import records
 from gpu.layout import LightKind, ShapeKind
 
 MOST_TARGETS = 16  # a ray asks each of them for its density
@@ -18,9 +22,6 @@ SMALL = 0.15
 _EVEN = 0.1  # the share of the paths that all lights get alike: what their power brings is a guess
 _ROOM = 1.0001  # of a ball, over what is inside: a rounding shall put none of that outside
 _FAR = 1e4  # radii of all targets together, from which light from infinity comes at most
-_GRID = 65535.0  # steps of a tree's grid
-_OF_SHAPES = (LightKind.SPHERE, LightKind.QUAD, LightKind.TRIANGLE, LightKind.ELLIPSOID, LightKind.CYLINDER)
-_LAMPS = (LightKind.POINT, LightKind.SPOT)
 
 
 class Sources(NamedTuple):
@@ -44,12 +45,12 @@ def throws(scene: SceneArrays) -> bool:
         return False
     kinds, lights = scene.lights["kind"], scene.lights
     cap = SMALL / (2 * np.pi)
-    if np.isin(kinds, _LAMPS).any() or ((kinds == LightKind.DIRECTIONAL) & (lights["spread"] < cap)).any():
+    if np.isin(kinds, POINTS).any() or ((kinds == LightKind.DIRECTIONAL) & (lights["spread"] < cap)).any():
         return True
     environment = scene.environment
     if environment is not None and environment.sun is not None and environment.sun.cap < cap:
         return True
-    shapes = np.isin(kinds, _OF_SHAPES)
+    shapes = np.isin(kinds, OF_SHAPES)
     if not shapes.any():
         return False
     found = targets(scene, specular)
@@ -62,7 +63,7 @@ def throws(scene: SceneArrays) -> bool:
 def hides(scene: SceneArrays) -> bool:
     """True if there are caustics of lamps without extent, which the camera's paths cannot find."""
     kinds, spread = scene.lights["kind"], scene.lights["spread"]
-    lamps = np.isin(kinds, _LAMPS) | ((kinds == LightKind.DIRECTIONAL) & (spread <= 0))
+    lamps = np.isin(kinds, POINTS) | ((kinds == LightKind.DIRECTIONAL) & (spread <= 0))
     return bool(lamps.any() and throws_caustics(scene.materials).any())
 
 
@@ -117,9 +118,9 @@ def _power(scene: SceneArrays, lights: np.ndarray, balls: np.ndarray) -> np.ndar
     if environment is not None and environment.sun is not None:
         irradiance = np.asarray(environment.sun.radiance, float) @ luminance * 2 * np.pi * environment.sun.cap
         out[kinds == LightKind.ENVIRONMENT] = disks * irradiance * environment.scale
-    lamps = np.isin(kinds, _LAMPS)
+    lamps = np.isin(kinds, POINTS)
     out[lamps] = intensity[lamps] * _solid_angles(lights["position"][lamps].astype(float), balls)
-    shapes = np.isin(kinds, _OF_SHAPES)
+    shapes = np.isin(kinds, OF_SHAPES)
     emission = scene.materials["emission"][lights["material"][shapes]].astype(float)
     emission[emission == np.float32(layout.TEXTURED)] = 1.0
     centers, areas = _extents(scene, lights[shapes])
@@ -139,41 +140,11 @@ def _solid_angles(p: np.ndarray, balls: np.ndarray) -> np.ndarray:
 def _extents(scene: SceneArrays, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The centres and the areas of lights that are shapes."""
     centers, areas = np.zeros((len(lights), 3)), np.zeros(len(lights))
-    for kind, of_kind in ((LightKind.SPHERE, scene.spheres), (LightKind.ELLIPSOID, scene.ellipsoids)):
-        mine = lights["kind"] == kind
-        some = of_kind[lights["index"][mine]]
-        centers[mine] = some["center"]
-        radii2 = some["radius"].astype(float) ** 2 if kind == LightKind.SPHERE else _half_axes2(some).mean(axis=1)
-        areas[mine] = 4 * np.pi * radii2
-    mine = lights["kind"] == LightKind.CYLINDER
-    pipes = scene.boxes[lights["index"][mine]]
-    lengths = np.linalg.norm(_axes(pipes), axis=1)
-    centers[mine] = pipes["center"]
-    areas[mine] = 4 * np.pi * lengths[:, 1] * np.sqrt((lengths[:, 0] ** 2 + lengths[:, 2] ** 2) / 2)
-    mine = lights["kind"] == LightKind.QUAD
-    quads = scene.quads[lights["index"][mine]]
-    centers[mine], areas[mine] = quads["origin"] + 0.5 * (quads["u"] + quads["v"]), quads["area"]
-    mine = lights["kind"] == LightKind.TRIANGLE
-    corners = _corners(scene.triangles[lights["index"][mine]])
-    centers[mine] = corners.mean(axis=1)
-    sides = corners[:, 1:] - corners[:, :1]
-    areas[mine] = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    for kind in OF_SHAPES:
+        mine, row = lights["kind"] == kind, LIGHTS[kind]
+        assert row.shape is not None and row.extent is not None
+        centers[mine], areas[mine] = row.extent(records(scene, row.shape)[lights["index"][mine]])
     return centers, areas
-
-
-def _axes(solids: np.ndarray) -> np.ndarray:
-    """(n, 3, 3): world from object."""
-    rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(float)
-    return np.linalg.inv(rows) if len(rows) else rows
-
-
-def _half_axes2(solids: np.ndarray) -> np.ndarray:
-    """The squares of the half axes, (n, 3)."""
-    return np.asarray((_axes(solids) ** 2).sum(axis=1))
-
-
-def _corners(triangles: np.ndarray) -> np.ndarray:
-    return np.stack([triangles["v0"], triangles["v1"], triangles["v2"]], axis=1).astype(float)
 
 
 def targets(scene: SceneArrays, specular: np.ndarray) -> np.ndarray:
@@ -184,57 +155,12 @@ def targets(scene: SceneArrays, specular: np.ndarray) -> np.ndarray:
 
 def _of(scene: SceneArrays, kind: ShapeKind, chosen: np.ndarray | None) -> np.ndarray:
     """Balls around the shapes of a kind, of some materials or of all."""
-    names = {
-        ShapeKind.SPHERE: "spheres", ShapeKind.QUAD: "quads", ShapeKind.BOX: "boxes",
-        ShapeKind.ELLIPSOID: "ellipsoids", ShapeKind.TRIANGLE: "triangles", ShapeKind.INSTANCE: "instances",
-    }  # fmt: skip
-    some = getattr(scene, names[kind])
+    some = records(scene, kind)
     if kind == ShapeKind.TRIANGLE and len(scene.instances):
         some = some[: int(scene.instances["first"].min())]  # the others are of instances
     if chosen is not None:
         some = some[chosen[some["material"]]]
-    if not len(some):
-        return np.zeros((0, 4))
-    if kind == ShapeKind.SPHERE:
-        return np.column_stack([some["center"].astype(float), some["radius"]])
-    if kind == ShapeKind.QUAD:
-        u, v = some["u"].astype(float), some["v"].astype(float)
-        radius = 0.5 * np.maximum(np.linalg.norm(u + v, axis=1), np.linalg.norm(u - v, axis=1))
-        return np.column_stack([some["origin"] + 0.5 * (u + v), radius])
-    if kind in (ShapeKind.BOX, ShapeKind.ELLIPSOID):
-        lengths2 = _half_axes2(some)
-        radius = np.sqrt(lengths2.sum(axis=1))
-        if kind == ShapeKind.BOX:  # its farthest corner
-            signs = np.array([(1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)], float)
-            radius = np.linalg.norm(np.einsum("nij,kj->nki", _axes(some), signs), axis=2).max(axis=1)
-        return np.column_stack([some["center"].astype(float), radius])
-    if kind == ShapeKind.TRIANGLE:
-        return _around_meshes(some)
-    return _around_instances(some)
-
-
-def _around_meshes(triangles: np.ndarray) -> np.ndarray:
-    """A ball around all triangles of each shape."""
-    owners = triangles["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.HIDDEN) & layout.NONE)
-    order = np.argsort(owners, kind="stable")
-    firsts = np.flatnonzero(np.diff(owners[order], prepend=-1))
-    corners = _corners(triangles[order])
-    low = np.minimum.reduceat(corners.min(axis=1), firsts)
-    high = np.maximum.reduceat(corners.max(axis=1), firsts)
-    center = 0.5 * (low + high)
-    mine = np.repeat(np.arange(len(firsts)), np.diff(firsts, append=len(order)))
-    away = np.linalg.norm(corners - center[mine][:, None], axis=2).max(axis=1)
-    return np.column_stack([center, np.maximum.reduceat(away, firsts)])
-
-
-def _around_instances(instances: np.ndarray) -> np.ndarray:
-    origin, size = instances["node_origin"].astype(float), _GRID * instances["node_scale"].astype(float)
-    third = np.stack([instances["axis_z_x"], instances["axis_z_y"], instances["axis_z_z"]], axis=1)
-    axes = np.stack([instances["axis_x"], instances["axis_y"], third], axis=2).astype(float)
-    center = np.einsum("nij,nj->ni", axes, origin + 0.5 * size) + instances["center"]
-    signs = np.array([(1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)], float)
-    halves = np.einsum("nij,knj->nki", axes, 0.5 * size[None] * signs[:, None])
-    return np.column_stack([center, np.linalg.norm(halves, axis=2).max(axis=1)])
+    return SHAPES[kind].around(some) if len(some) else np.zeros((0, 4))
 
 
 def _around(balls: np.ndarray) -> np.ndarray:

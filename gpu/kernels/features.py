@@ -10,9 +10,10 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
-from gpu.kernels import textures_glsl
+from gpu.kernels import light_kinds, textures_glsl
 from gpu.kernels.flag import ANYWHERE, beside
-from gpu.kernels.flag_table import FLAGS, SHAPES, looped_count
+from gpu.kernels.flag_table import FLAGS, looped_count
+from gpu.kernels.shape_kinds import LOOPED
 from gpu.layout import ShapeKind
 from gpu.layout.models import DELTA, FLAGGED, TABULATED, TRANSMITTING
 from gpu.layout.pixel_layers import SPLAT_BYTES
@@ -86,15 +87,9 @@ def needs_tables(raised: Container[str]) -> bool:
     return any(model.flag in raised for model in TABULATED)
 
 
-# Flags of lights that are somewhere.
-NEAR_LIGHTS = frozenset(
-    f"HAS_{kind}_LIGHTS" for kind in ("POINT", "SPOT", "SPHERE", "QUAD", "TRIANGLE", "ELLIPSOID", "CYLINDER")
-)
-
-
 def draws_towards_lamps(raised: frozenset[str]) -> bool:
     """True if distances in media are drawn towards lamps."""
-    return raised >= {"HAS_MEDIA", "HAS_SCATTERING"} and not raised.isdisjoint(NEAR_LIGHTS)
+    return raised >= {"HAS_MEDIA", "HAS_SCATTERING"} and not raised.isdisjoint(light_kinds.NEAR)
 
 
 # Units, to a picture's scale of radiance, in which light is summed that comes to a pixel from elsewhere. 64 bits hold
@@ -118,7 +113,7 @@ def traces_caustics(raised: Container[str], settings: RenderSettings) -> bool:
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
 # varying index. 0: they are too many for that to gain time, or in the tree. docs/development.md says what each gains.
-COUNTS = {f"{kind.name}_COUNT": kind for kind in SHAPES}
+COUNTS = {f"{kind.name}_COUNT": kind for kind in LOOPED}
 FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
 _FEW_MAX = 64
 _BLOCK_BYTES = 16384  # bytes that a uniform block may have with every driver
@@ -133,7 +128,7 @@ def _loop(name: str) -> str:
 
 def looped(scene: SceneArrays) -> dict[str, int]:
     """The number of shapes of each kind that stand in the kernel's loops, by their member of `layout.Uniforms`."""
-    return {f"looped_{records}": looped_count(scene, kind) for kind, records in SHAPES.items()}
+    return {f"looped_{records}": looped_count(scene, kind) for kind, records in LOOPED.items()}
 
 
 # The defines of a kernel that shows what others are compiled for. Its rays begin a new walk down the tree after each
@@ -143,7 +138,7 @@ SOON: dict[str, object] = {"OPACITY_WALK": 0, "SHADE_ONCE": 1}
 
 def loops_from_uniforms() -> dict[str, object]:
     """The defines of a kernel that reads from the uniforms how many turns its loops make."""
-    turns: dict[str, object] = {_loop(name): f"uniforms.looped_{SHAPES[kind]}" for name, kind in COUNTS.items()}
+    turns: dict[str, object] = {_loop(name): f"uniforms.looped_{LOOPED[kind]}" for name, kind in COUNTS.items()}
     return turns | SOON
 
 
@@ -188,6 +183,8 @@ def defines(
     out["ANY_MEDIA"] = int(not raised.isdisjoint(("HAS_MEDIA", "HAS_SCATTERING")))
     out["ANY_EQUIANGULAR"] = int(draws_towards_lamps(raised))
     out["ANY_CHAINS"] = int(not raised.isdisjoint(("HAS_BVH", "HAS_MIRRORS", "HAS_PRIORITIES", "HAS_WALKS")))
+    for name, kinds in light_kinds.GROUPS.items():
+        out[name] = int(not raised.isdisjoint(light_kinds.flags(kinds)))
     out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
     out["ANY_FILM"] = int(not raised.isdisjoint(FILMS))
     out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))

@@ -15,23 +15,15 @@ from gpu.arrays import SceneArrays
 from gpu.kernels import caustics, media, textures_glsl
 from gpu.kernels.deltas import filmed, goes_straight, mirrors, transmits
 from gpu.kernels.flag import ANYWHERE, Asks, Flag
+from gpu.kernels.shape_kinds import records
 from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
 from gpu.layout.models import BY_NUMBER, COATED, COVERING, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
-# The records of each kind of shape that may stand in a kernel's loop; instances never do.
-SHAPES = {
-    ShapeKind.SPHERE: "spheres",
-    ShapeKind.QUAD: "quads",
-    ShapeKind.BOX: "boxes",
-    ShapeKind.ELLIPSOID: "ellipsoids",
-    ShapeKind.TRIANGLE: "triangles",
-}
-
 
 def looped_count(scene: SceneArrays, kind: ShapeKind) -> int:
     """The number of shapes of a kind that stand in the kernel's loop; they come first among their records."""
-    return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(getattr(scene, SHAPES[kind]))
+    return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(records(scene, kind))
 
 
 def _linear(kind: ShapeKind) -> Asks:
@@ -42,8 +34,8 @@ def _tree(kind: ShapeKind) -> Asks:
     return lambda s: kind in s.bvh_kinds
 
 
-def _round(records: str) -> Asks:
-    return lambda s: bool((getattr(s, records)["shape"] & np.uint32(layout.ROUND)).any())
+def _round(kind: ShapeKind) -> Asks:
+    return lambda s: bool((records(s, kind)["shape"] & np.uint32(layout.ROUND)).any())
 
 
 def _light(kind: LightKind) -> Asks:
@@ -59,8 +51,7 @@ def _sun_disks(s: SceneArrays) -> bool:
 
 
 def _hidden(s: SceneArrays) -> bool:
-    records = (getattr(s, name)["shape"] for name in (*SHAPES.values(), "instances"))
-    return any(bool((shapes & np.uint32(layout.HIDDEN)).any()) for shapes in records)
+    return any(bool((records(s, kind)["shape"] & np.uint32(layout.HIDDEN)).any()) for kind in ShapeKind)
 
 
 def _any_of(models: Iterable[Model]) -> Asks:
@@ -244,9 +235,9 @@ _ROWS = (
     Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
     Flag("HAS_VAST_SPHERES", lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any())),
     Flag("HAS_QUADS", _linear(ShapeKind.QUAD), previewed=lambda s: len(s.boxes) > 0),  # of one that shines
-    Flag("HAS_DISKS", _round("quads"), previewed=_round("boxes")),  # the caps of a cylinder that shines
+    Flag("HAS_DISKS", _round(ShapeKind.QUAD), previewed=_round(ShapeKind.BOX)),  # the caps of a cylinder that shines
     Flag("HAS_BOXES", _linear(ShapeKind.BOX)),
-    Flag("HAS_CYLINDERS", _round("boxes"), in_general=False),
+    Flag("HAS_CYLINDERS", _round(ShapeKind.BOX), in_general=False),
     Flag("HAS_ELLIPSOIDS", _linear(ShapeKind.ELLIPSOID), in_general=False),
     Flag("HAS_TRIANGLES", _linear(ShapeKind.TRIANGLE)),
     Flag("HAS_BVH", lambda s: bool(s.bvh_kinds)),
@@ -308,7 +299,7 @@ _ROWS = (
         previewed=lambda s: len(s.ellipsoids) > 0,
         in_general=False,
     ),
-    Flag("HAS_CYLINDER_LIGHTS", _light(LightKind.CYLINDER), previewed=_round("boxes"), in_general=False),
+    Flag("HAS_CYLINDER_LIGHTS", _light(LightKind.CYLINDER), previewed=_round(ShapeKind.BOX), in_general=False),
     Flag("HAS_ENVIRONMENT", lambda s: s.environment is not None),
     Flag("HAS_ENVIRONMENT_IMAGE", lambda s: (e := s.environment) is not None and e.texels.size > 3 and not e.cube),
     Flag("HAS_ENVIRONMENT_CUBE", lambda s: s.environment is not None and s.environment.cube, in_general=False),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from gpu import layout
 from gpu.kernels import bodies_glsl, instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
+from gpu.kernels.light_kinds import POINTS
 from gpu.kernels.words_glsl import unpacked
 from gpu.layout import CameraKind, LightKind, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, GuessSlot, Slot
@@ -112,6 +113,8 @@ def constants() -> str:
     out = []
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("CAMERA", CameraKind)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
+    is_point = " || ".join(f"(kind) == LIGHT_{kind.name}" for kind in POINTS)
+    out.append(f"#define LIGHT_IS_POINT(kind) ({is_point})")
     out += [f"const uint MODEL_{model.name.upper()} = {model.number}u;" for model in MODELS]
     out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
@@ -122,6 +125,8 @@ def constants() -> str:
     for name in (
         "NONE",
         "SINGLE_SIDED",
+        "SHAPE_BITS",
+        "SOLID_BITS",
         "HIDDEN",
         "ROUND",
         "OPEN",

@@ -24,6 +24,8 @@ HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
 ROUND = 0x20000000  # in Quad.shape: only the ellipse that touches its four edges is there, which is a disk; in the
 # shape of a box: only the cylinder about its y axis that touches its faces
 OPEN = 0x10000000  # in the shape of a cylinder: it has no caps
+SOLID_BITS = ROUND | OPEN  # what says which shape the record of a box is
+SHAPE_BITS = SINGLE_SIDED | HIDDEN | SOLID_BITS  # all that stands beside the index of a shape
 # In TriangleNormals.bits: NORMALS_SMOOTH: the corners' normals are interpolated; NORMALS_LEFT: v grows to the right
 # of u, seen from outside. From TANGENT_SHIFT on follow three codes of TANGENT_BITS each: 0 for no tangent, else 1 +
 # its angle in the plane of the corner's normal, in steps. A step is 0.35 degrees, less than a normal map of 8 bits

@@ -12,17 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.device.scene import Scene
 from gpu.device.uploads import SharedUploads
 from gpu.kernels import features
 from gpu.kernels.flag import beside
 from gpu.kernels.flag_table import FLAGS
+from gpu.kernels.shape_kinds import quads_when_shining
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
-
-_FACES, _CAPS = 6, 2  # quads that a box becomes when it shines, and a cylinder besides its side
 
 
 def superset(arrays: SceneArrays) -> frozenset[str]:
@@ -63,17 +61,14 @@ def superset_keys(
     arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]
 ) -> list[kernel_keys.KernelKey]:
     """The keys of the superset kernels with these flags that sliders of the scene may need: one for the scene, and
-    one for each number of boxes and cylinders that may begin to shine together."""
+    one for each number of solids that may begin to shine together."""
     found = [kernel_key(arrays, settings, raised)]
-    owners, bits = arrays.boxes["material"], arrays.boxes["shape"]
-    is_round, is_open = (bits & np.uint32(layout.ROUND)) > 0, (bits & np.uint32(layout.OPEN)) > 0
-    faces = np.where(is_round, np.where(is_open, 0, _CAPS), _FACES)  # that become quads
-    shining = {
-        (int(faces[owners == each].sum()), int((~is_round & (owners == each)).sum())) for each in np.unique(owners)
-    }
+    owners = arrays.boxes["material"]
+    quads, goes = quads_when_shining(arrays.boxes)
+    shining = {(int(quads[owners == each].sum()), int(goes[owners == each].sum())) for each in np.unique(owners)}
     for more, gone in sorted(shining):
-        quads = np.concatenate([arrays.quads, np.zeros(more, arrays.quads.dtype)])
-        found.append(kernel_key(replace(arrays, boxes=arrays.boxes[gone:], quads=quads), settings, raised))
+        faces = np.concatenate([arrays.quads, np.zeros(more, arrays.quads.dtype)])
+        found.append(kernel_key(replace(arrays, boxes=arrays.boxes[gone:], quads=faces), settings, raised))
     return [key for key in found if key is not None]
 
 

@@ -92,7 +92,7 @@ def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey |
     """
     if len(arrays.instances):
         return None
-    owners = arrays.triangles["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.HIDDEN) & layout.NONE)
+    owners = arrays.triangles["shape"] & np.uint32(~layout.SHAPE_BITS & layout.NONE)
     counts, lamps = np.bincount(owners), np.bincount(owners, arrays.triangles["light"] != layout.NONE)
     if not ((counts >= HEAVY) & (lamps == 0)).any():
         return None

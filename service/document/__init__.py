@@ -21,7 +21,7 @@ presets         built-in scenes, materials and environments
 
 from __future__ import annotations
 
-from service.document.camera import AnyCamera, Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
+from service.document.camera import AnyCamera, Camera
 from service.document.color import Color
 from service.document.document import SavedMaterial, Scene, check_saved_material, parse_scene
 from service.document.environment import (
@@ -31,7 +31,7 @@ from service.document.environment import (
     ImageEnvironment,
     SkyEnvironment,
 )
-from service.document.light import DirectionalLight, Light, PointLight, SpotLight
+from service.document.light import Light
 from service.document.material import (
     BlinnPhongMaterial,
     DiffuseMaterial,
@@ -44,7 +44,7 @@ from service.document.numbers import Vec3
 from service.document.procedural import NoiseTexture, RampInput, RampStop, RampTexture
 from service.document.schema import schema
 from service.document.settings import Limits, Settings, parse_settings
-from service.document.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
+from service.document.shape import MeshShape, Shape
 from service.document.text import load_json, merge_patch
 from service.document.texture import (
     CheckerTexture,
@@ -60,17 +60,13 @@ from service.document.transform import MatrixTransform, Transform
 __all__ = [
     "AnyCamera",
     "BlinnPhongMaterial",
-    "BoxShape",
     "Camera",
     "CheckerTexture",
     "Color",
     "ColorTexture",
     "ConstantEnvironment",
     "CubemapEnvironment",
-    "CylinderShape",
     "DiffuseMaterial",
-    "DirectionalLight",
-    "DiskShape",
     "DisneyMaterial",
     "Environment",
     "HeightTexture",
@@ -84,12 +80,7 @@ __all__ = [
     "MetalRoughMaterial",
     "NoiseTexture",
     "NormalTexture",
-    "OrthographicCamera",
-    "PanoramaCamera",
-    "PerspectiveCamera",
-    "PointLight",
     "PrincipledMaterial",
-    "QuadShape",
     "RampInput",
     "RampStop",
     "RampTexture",
@@ -99,8 +90,6 @@ __all__ = [
     "Settings",
     "Shape",
     "SkyEnvironment",
-    "SphereShape",
-    "SpotLight",
     "Texture",
     "Transform",
     "Vec3",

@@ -2,6 +2,7 @@
 
 scene               the arrays of a whole scene, from a document and its assets
 parameters          camera, materials, the environment's rotation: their edits need no other module here
+camera_kinds        a row for each kind of camera
 measured            measured reflection, by files
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with their probabilities, and environments with the tables that draw from them

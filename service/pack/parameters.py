@@ -9,17 +9,18 @@ import math
 import numpy as np
 
 from gpu import layout
-from gpu.layout import CameraKind, models
+from gpu.layout import models
 from gpu.layout.microfacet_records import TERMS, Distribution, Microfacet
 from gpu.tables import microfacet as tables
 from service.document import Scene
-from service.document.camera import AnyCamera, OrthographicCamera, PanoramaCamera, PerspectiveCamera
+from service.document.camera import AnyCamera
 from service.document.environment import Environment, SkyEnvironment
 from service.document.material import Material
 from service.document.material.microfacet import MicrofacetMaterial
 from service.document.material.surface import SolidSurface
 from service.document.numbers import Vec3
 from service.document.texture import ColorTexture, ScalarTexture
+from service.pack.camera_kinds import fill_camera
 
 # The renderer's names of a material's parameters, where they differ from the document's.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
@@ -70,12 +71,6 @@ RENAMED_IN = {
 }
 SIDES = {"front": 1, "both": 2}
 
-CAMERA_KINDS = {
-    PerspectiveCamera: CameraKind.PERSPECTIVE,
-    OrthographicCamera: CameraKind.ORTHOGRAPHIC,
-    PanoramaCamera: CameraKind.PANORAMA,
-}
-
 
 def pack_camera(camera: AnyCamera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
     """A `layout.Camera`, relative to `SceneArrays.origin`."""
@@ -91,13 +86,7 @@ def pack_camera(camera: AnyCamera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
     out["up"] = np.cross(right, forward)
     out["forward"] = forward
     out["focus_distance"] = distance
-    if isinstance(camera, PerspectiveCamera):
-        out["half_height"] = math.tan(math.radians(camera.vfov) / 2)
-        out["aperture_radius"] = camera.aperture_radius
-        out["focus_distance"] = distance if camera.focus_distance is None else camera.focus_distance
-    elif isinstance(camera, OrthographicCamera):
-        out["half_height"] = camera.height / 2
-    out["kind"] = CAMERA_KINDS[type(camera)]
+    fill_camera(out, camera)
     return out
 
 

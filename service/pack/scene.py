@@ -11,7 +11,8 @@ import numpy as np
 
 from gpu import EnvironmentArrays, SceneArrays, scene_bytes
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
-from service.document import Material, PerspectiveCamera, Scene
+from service.document import Material, Scene
+from service.document.camera import PerspectiveCamera
 from service.document.environment import Environment
 from service.document.numbers import BRIGHTEST
 from service.document.shape import MeshShape

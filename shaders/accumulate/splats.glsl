@@ -36,11 +36,7 @@ void splats_add_filtered(vec2 at, vec3 c, bool odd) {
     ivec2 low = ivec2(floor(at - radius - 0.5)), high = ivec2(ceil(at + radius - 0.5)), size = ivec2(uniforms.resolution);
     low.y = max(low.y, 0);
     high.y = min(high.y, size.y - 1);
-    bool around = false;
-#if HAS_PANORAMA
-    around = uniforms.camera.kind == CAMERA_PANORAMA;
-#endif
-    if (!around) {
+    if (!camera_is_around()) {
         low.x = max(low.x, 0);
         high.x = min(high.x, size.x - 1);
     }
@@ -57,8 +53,7 @@ void splats_add_filtered(vec2 at, vec3 c, bool odd) {
 // The same where the picture goes on beyond its edges: over the poles of a panorama.
 void splats_take(vec2 at, vec3 c, bool odd) {
     splats_add_filtered(at, c, odd);
-#if HAS_PANORAMA
-    if (uniforms.camera.kind == CAMERA_PANORAMA) {
+    if (camera_is_around()) {
         vec2 size = vec2(uniforms.resolution);
         vec2 over = vec2(mod(at.x + 0.5 * size.x, size.x), -at.y);
         float radius = sampling_filter_radius();
@@ -66,6 +61,5 @@ void splats_take(vec2 at, vec3 c, bool odd) {
         over.y = 2.0 * size.y - at.y;
         if (size.y - at.y < radius) splats_add_filtered(over, c, odd);
     }
-#endif
 }
 #endif

@@ -129,3 +129,25 @@ void cylinder_light_pdf_case(Hit hit, vec3 p, SurfacePoint at, vec3 wi, Emitter 
     }
 #endif
 }
+
+#if CAUSTICS
+void cylinder_light_place_case(Light l, vec2 u, inout LightPlace at) {
+#if HAS_CYLINDER_LIGHTS
+    if (l.kind == LIGHT_CYLINDER) {
+        Solid s = box_pick(l.index);
+        vec3 n = vec3(cos(TWO_PI * u.x), 0.0, sin(TWO_PI * u.x));
+        at.p = solid_point(s, vec3(n.x, 2.0 * u.y - 1.0, n.z), n).p;
+        at.id = (SHAPE_BOX << LEAF_KIND_SHIFT) | l.index;
+        at.pdf_area = cylinder_light_area_density(s, n);
+    }
+#endif
+}
+#endif
+
+#if HAS_TEXTURED_LIGHTS
+void cylinder_light_near_case(LightSample s, vec3 p, inout float near) {
+#if HAS_CYLINDER_LIGHTS
+    if (s.id >> LEAF_KIND_SHIFT == SHAPE_BOX) near = cylinder_near(box_pick(s.id & LEAF_FIRST_MASK), p, s.wi);
+#endif
+}
+#endif

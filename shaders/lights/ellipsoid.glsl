@@ -52,3 +52,29 @@ void ellipsoid_light_pdf_case(Hit hit, SurfacePoint at, vec3 wi, Emitter e, inou
     }
 #endif
 }
+
+#if CAUSTICS
+void ellipsoid_light_place_case(Light l, vec2 u, inout LightPlace at) {
+#if HAS_ELLIPSOID_LIGHTS
+    if (l.kind == LIGHT_ELLIPSOID) {
+        Solid s = ellipsoid_pick(l.index);
+        vec3 n = sampling_sphere(u);
+        at.p = solid_point(s, n, n).p;
+        at.id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
+        at.pdf_area = ellipsoid_light_density(s, n);
+    }
+#endif
+}
+#endif
+
+#if HAS_TEXTURED_LIGHTS
+void ellipsoid_light_near_case(LightSample s, vec3 p, inout float near) {
+#if HAS_ELLIPSOID_LIGHTS
+    if (s.id >> LEAF_KIND_SHIFT == SHAPE_ELLIPSOID) {
+        Solid ball = ellipsoid_pick(s.id & LEAF_FIRST_MASK);
+        vec3 f = solid_rows(ball, ball.center - p), g = solid_rows(ball, s.wi);
+        near = 2.0 * dot(f, g) / dot(g, g) - s.t;
+    }
+#endif
+}
+#endif

@@ -145,83 +145,24 @@ void emission_sun_case(Light l, float u_target, vec2 u_sun, vec2 u, inout Emissi
 }
 
 void emission_point_case(Light l, float u_target, vec2 u, inout Emission e) {
-#if HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS
-    if (l.kind == LIGHT_POINT || l.kind == LIGHT_SPOT) {
+#if ANY_POINT_LIGHTS
+    if (LIGHT_IS_POINT(l.kind)) {
         float pdf;
         e.d = emission_aim(l.position, u_target, u, pdf);
         e.o = l.position;
         e.placed = true;
         e.flux = l.intensity / pdf;
-#if HAS_SPOT_LIGHTS
-        if (l.kind == LIGHT_SPOT) e.flux *= spot_light_share(l, -e.d);
-#endif
+        e.flux *= lights_share(l, -e.d);
     }
 #endif
 }
-
-#if HAS_EMISSION
-// A place on a shape that shines: the place, its weights on a triangle, and its density per area.
-void emission_place(Light l, vec2 u, out vec3 q, out vec2 uv, out uint id, out float pdf_area) {
-    q = vec3(0.0);
-    uv = vec2(0.0);
-    id = NONE;
-    pdf_area = 0.0;
-#if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) {
-        Sphere s = sphere_pick(l.index);
-        q = s.center + s.radius * sampling_sphere(u);
-        id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
-        pdf_area = 1.0 / (4.0 * PI * s.radius * s.radius);
-    }
-#endif
-#if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) {
-        Quad s = quad_light_load(l.index);
-        vec2 place = disk_is(s) ? disk_light_place(u) : u;
-        q = s.origin + place.x * s.u + place.y * s.v;
-        id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | l.index;
-        pdf_area = 1.0 / s.area;
-    }
-#endif
-#if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) {
-        Triangle s = triangle_pick(l.index);
-        uv = sampling_triangle(u);
-        q = s.v0 + uv.x * (s.v1 - s.v0) + uv.y * (s.v2 - s.v0);
-        id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | l.index;
-        pdf_area = 1.0 / triangle_light_area(s);
-    }
-#endif
-#if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) {
-        Solid s = ellipsoid_pick(l.index);
-        vec3 n = sampling_sphere(u);
-        q = solid_point(s, n, n).p;
-        id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
-        pdf_area = ellipsoid_light_density(s, n);
-    }
-#endif
-#if HAS_CYLINDER_LIGHTS
-    if (l.kind == LIGHT_CYLINDER) {
-        Solid s = box_pick(l.index);
-        vec3 n = vec3(cos(TWO_PI * u.x), 0.0, sin(TWO_PI * u.x));
-        q = solid_point(s, vec3(n.x, 2.0 * u.y - 1.0, n.z), n).p;
-        id = (SHAPE_BOX << LEAF_KIND_SHIFT) | l.index;
-        pdf_area = cylinder_light_area_density(s, n);
-    }
-#endif
-}
-#endif
 
 void emission_shape_case(Light l, float u_target, vec2 u_place, vec2 u, inout Emission e) {
 #if HAS_EMISSION
     if (l.kind >= LIGHT_SPHERE) {
-        vec3 q;
-        vec2 uv;
-        uint id;
-        float pdf_area, pdf;
-        emission_place(l, u_place, q, uv, id, pdf_area);
-        e.at = shapes_point(Hit(0.0, id, uv), q, vec3(0.0, 0.0, 1.0));
+        float pdf;
+        LightPlace place = lights_place(l, u_place);
+        e.at = shapes_point(Hit(0.0, place.id, place.uv), place.p, vec3(0.0, 0.0, 1.0));
         e.d = emission_aim(e.at.p, u_target, u, pdf);
         vec3 radiance = found_light_emission(e.at, -e.d, cone_none());
         float across = dot(e.d, e.at.ng);
@@ -234,7 +175,7 @@ void emission_shape_case(Light l, float u_target, vec2 u_place, vec2 u, inout Em
         e.o = shapes_leave(e.at, e.d);
         e.skip = e.at.flat_id;
         e.placed = true;
-        e.flux = radiance * (abs(across) / (pdf * pdf_area));
+        e.flux = radiance * (abs(across) / (pdf * place.pdf_area));
     }
 #endif
 }

@@ -62,32 +62,14 @@ vec2 emitter_uv(uint id, vec3 q) {
 #endif
 
 #if HAS_TEXTURED_LIGHTS
-// The distance from p to the near half of a ball or a cylinder whose far half is sampled; 0 for other shapes.
-float emitter_near(LightSample s, vec3 p) {
-    uint index = s.id & LEAF_FIRST_MASK, kind = s.id >> LEAF_KIND_SHIFT;
-    float near = 0.0;
-#if HAS_SPHERE_LIGHTS
-    if (kind == SHAPE_SPHERE) near = 2.0 * dot(sphere_pick(index).center - p, s.wi) - s.t;
-#endif
-#if HAS_ELLIPSOID_LIGHTS
-    if (kind == SHAPE_ELLIPSOID) {
-        Solid ball = ellipsoid_pick(index);
-        vec3 f = solid_rows(ball, ball.center - p), g = solid_rows(ball, s.wi);
-        near = 2.0 * dot(f, g) / dot(g, g) - s.t;
-    }
-#endif
-#if HAS_CYLINDER_LIGHTS
-    if (kind == SHAPE_BOX) near = cylinder_near(box_pick(index), p, s.wi);
-#endif
-    return near;
-}
+float lights_near(LightSample s, vec3 p); // lights.glsl
 
 // The share of the light that arrives from the sampled place: the inside of a far half is seen through the near half, as
 // far as that is transparent.
 float emitter_share(LightSample s, vec3 p, Hit hit, SurfacePoint at) {
     float share = 1.0;
 #if HAS_OPACITY && HAS_EMISSION_BOTH
-    float near = emitter_near(s, p);
+    float near = lights_near(s, p);
     SurfacePoint through = shapes_point(hit, p + near * s.wi, vec3(0.0, 0.0, 1.0));
     if (near > 0.0 && dot(s.wi, at.ng) > 0.0) share = 1.0 - texture_opacity(through);
 #endif

@@ -45,7 +45,7 @@ vec3 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     if (context.through) cos_in = abs(cos_in);
 #endif
     cos_in = clamp(cos_in + sin_ball, 0.0, 1.0);
-#if HAS_QUAD_LIGHTS || HAS_TRIANGLE_LIGHTS || HAS_SPOT_LIGHTS
+#if ANY_AIMED_LIGHTS
     float half_sine = float(node.y >> 24u) * (1.0 / 255.0);
     float cos_cone = 1.0 - 2.0 * half_sine * half_sine;
     float sin_cone = cos_cone <= 0.0 ? 1.0 : sqrt(max(0.0, 1.0 - cos_cone * cos_cone));

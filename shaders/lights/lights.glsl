@@ -11,6 +11,16 @@ struct LightSample {
 
 LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true, NONE); }
 
+#if CAUSTICS
+// A place on a shape that shines.
+struct LightPlace {
+    vec3 p;
+    vec2 uv;        // its weights on a triangle
+    uint id;        // the shape
+    float pdf_area; // its density per area
+};
+#endif
+
 #include "lights/point.glsl"
 #include "lights/spot.glsl"
 #include "lights/directional.glsl"
@@ -83,3 +93,34 @@ float lights_pdf(uint light, Hit hit, SurfacePoint at, LightContext context, vec
     cylinder_light_pdf_case(hit, p, at, wi, e, pdf);
     return pdf * l.probability;
 }
+
+#if CAUSTICS
+// Draws a place on a shape that shines. Of the functions below only the one of the light's kind changes `at`.
+LightPlace lights_place(Light l, vec2 u) {
+    LightPlace at = LightPlace(vec3(0.0), vec2(0.0), NONE, 0.0);
+    sphere_light_place_case(l, u, at);
+    quad_light_place_case(l, u, at);
+    triangle_light_place_case(l, u, at);
+    ellipsoid_light_place_case(l, u, at);
+    cylinder_light_place_case(l, u, at);
+    return at;
+}
+
+// The part of a point's intensity that it sends against the direction wi.
+float lights_share(Light l, vec3 wi) {
+    float share = 1.0;
+    spot_light_share_case(l, wi, share);
+    return share;
+}
+#endif
+
+#if HAS_TEXTURED_LIGHTS
+// The distance from p to the near half of a round shape whose far half is sampled; 0 for other shapes.
+float lights_near(LightSample s, vec3 p) {
+    float near = 0.0;
+    sphere_light_near_case(s, p, near);
+    ellipsoid_light_near_case(s, p, near);
+    cylinder_light_near_case(s, p, near);
+    return near;
+}
+#endif

@@ -115,3 +115,17 @@ void quad_light_pdf_case(Hit hit, vec3 p, vec3 wi, Emitter e, inout float pdf) {
     }
 #endif
 }
+
+#if CAUSTICS
+void quad_light_place_case(Light l, vec2 u, inout LightPlace at) {
+#if HAS_QUAD_LIGHTS
+    if (l.kind == LIGHT_QUAD) {
+        Quad s = quad_light_load(l.index);
+        vec2 place = disk_is(s) ? disk_light_place(u) : u;
+        at.p = s.origin + place.x * s.u + place.y * s.v;
+        at.id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | l.index;
+        at.pdf_area = 1.0 / s.area;
+    }
+#endif
+}
+#endif

@@ -67,3 +67,26 @@ void sphere_light_pdf_case(Hit hit, vec3 p, Emitter e, inout float pdf) {
     }
 #endif
 }
+
+#if CAUSTICS
+void sphere_light_place_case(Light l, vec2 u, inout LightPlace at) {
+#if HAS_SPHERE_LIGHTS
+    if (l.kind == LIGHT_SPHERE) {
+        Sphere s = sphere_pick(l.index);
+        at.p = s.center + s.radius * sampling_sphere(u);
+        at.id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
+        at.pdf_area = 1.0 / (4.0 * PI * s.radius * s.radius);
+    }
+#endif
+}
+#endif
+
+#if HAS_TEXTURED_LIGHTS
+void sphere_light_near_case(LightSample s, vec3 p, inout float near) {
+#if HAS_SPHERE_LIGHTS
+    if (s.id >> LEAF_KIND_SHIFT == SHAPE_SPHERE) {
+        near = 2.0 * dot(sphere_pick(s.id & LEAF_FIRST_MASK).center - p, s.wi) - s.t;
+    }
+#endif
+}
+#endif

@@ -18,3 +18,11 @@ void spot_light_sample_case(Light l, vec3 p, inout LightSample s) {
     if (l.kind == LIGHT_SPOT) s = spot_light_sample(l, p);
 #endif
 }
+
+#if CAUSTICS
+void spot_light_share_case(Light l, vec3 wi, inout float share) {
+#if HAS_SPOT_LIGHTS
+    if (l.kind == LIGHT_SPOT) share = spot_light_share(l, wi);
+#endif
+}
+#endif

@@ -109,3 +109,17 @@ void triangle_light_pdf_case(Hit hit, vec3 p, SurfacePoint at, vec3 wi, Emitter 
     }
 #endif
 }
+
+#if CAUSTICS
+void triangle_light_place_case(Light l, vec2 u, inout LightPlace at) {
+#if HAS_TRIANGLE_LIGHTS
+    if (l.kind == LIGHT_TRIANGLE) {
+        Triangle s = triangle_pick(l.index);
+        at.uv = sampling_triangle(u);
+        at.p = s.v0 + at.uv.x * (s.v1 - s.v0) + at.uv.y * (s.v2 - s.v0);
+        at.id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | l.index;
+        at.pdf_area = 1.0 / triangle_light_area(s);
+    }
+#endif
+}
+#endif

@@ -2,7 +2,7 @@
 // ball around the middle.
 #if HAS_SOLID_TEXTURES || HAS_PROJECTIONS
 ShapeSpace space_of(SurfacePoint at) {
-    return shape_space_load(at.shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN));
+    return shape_space_load(at.shape & ~SHAPE_BITS);
 }
 
 vec3 space_place(ShapeSpace own, vec3 p) {

@@ -14,15 +14,9 @@ struct Cone {
 // The cone of a camera's ray along d.
 Cone cone_begin(vec3 d) {
 #if ANY_FOOTPRINTS
-    Camera c = uniforms.camera;
-    float pixel = 2.0 * c.half_height / float(uniforms.resolution.y);
-#if HAS_ORTHOGRAPHIC
-    if (c.kind == CAMERA_ORTHOGRAPHIC) return Cone(uniforms.footprint_share * pixel, 0.0);
-#endif
-#if HAS_PANORAMA
-    if (c.kind == CAMERA_PANORAMA) return Cone(0.0, uniforms.footprint_share * PI / float(uniforms.resolution.y));
-#endif
-    return Cone(0.0, uniforms.footprint_share * pixel * dot(d, c.forward));
+    Cone cone;
+    camera_cone(d, cone.width, cone.spread);
+    return cone;
 #else
     return Cone(0.0);
 #endif

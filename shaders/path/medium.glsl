@@ -40,7 +40,7 @@ bool medium_around(Medium m) {
 
 #if HAS_MEDIA
 // The number of a shape's body.
-uint medium_id(uint shape) { return 1u + (shape & ~(SINGLE_SIDED | HIDDEN | ROUND | OPEN)); }
+uint medium_id(uint shape) { return 1u + (shape & ~SHAPE_BITS); }
 #endif
 
 // Whether the ray passes the surface because it is inside a higher body.

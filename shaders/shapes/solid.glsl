@@ -2,7 +2,7 @@
 // (cylinder.glsl). Rays are intersected in the solid's own space, where their direction is not of unit length, so that t
 // is the same in both spaces.
 
-#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS || HAS_ELLIPSOID_LIGHTS || HAS_CYLINDER_LIGHTS
+#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS || ANY_SOLID_LIGHTS
 vec3 solid_rows(Solid s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_y, v), dot(s.row_z, v)); }
 
 // The columns of world_from_object, from the rows of its inverse.
@@ -27,7 +27,7 @@ SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
     r.ns = r.ng;
     r.material = s.material;
     r.light = s.light;
-    r.shape = HAS_CYLINDERS != 0 ? s.shape & ~(ROUND | OPEN) : s.shape;
+    r.shape = s.shape & ~SOLID_BITS;
     r.flat_id = NONE;
     r.tangent = axes[0];
 #if HAS_TEXTURES || HAS_ANISOTROPIC

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from service.document import Camera, OrthographicCamera, PanoramaCamera, PerspectiveCamera, Scene
+from service.document import AnyCamera, Camera, Scene
 from service.document.base import Named
-from service.document.light import DirectionalLight, Light, SpotLight
+from service.document.camera import OrthographicCamera, PerspectiveCamera
+from service.document.light import DirectionalLight, Light, PointLight, SpotLight
+from service.document.numbers import Vec3
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
 from service.formats.types import Doubles
@@ -65,11 +68,9 @@ class Nodes:
 
 
 def add_camera(camera: Camera, nodes: Nodes, losses: Losses) -> None:
-    if isinstance(camera, PanoramaCamera):
-        losses.add("/camera/type", "glTF has no panoramas: there is no camera in the file")
+    if type(camera) not in _LENSES:
+        losses.add("/camera/type", f"glTF has no {camera.type} cameras: there is no camera in the file")
         return
-    if isinstance(camera, PerspectiveCamera) and camera.aperture_radius > 0:
-        losses.add("/camera/aperture_radius", "glTF's cameras have no depth of field: everything is sharp")
     for name in sorted(camera.model_fields_set - {*_CAMERA}):
         if getattr(camera, name) not in (type(camera).model_fields[name].default, None):
             losses.add(f"/camera/{name}", "this has no place in glTF and is left out")
@@ -81,23 +82,36 @@ def add_camera(camera: Camera, nodes: Nodes, losses: Losses) -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, np.cross(right, forward), -forward], axis=1)
     matrix[:3, 3] = position
-    if isinstance(camera, OrthographicCamera):
-        half = camera.height / 2
-        lens = {"xmag": half, "ymag": half, "znear": 0.0, "zfar": FAR * distance}
-    else:
-        lens = {"yfov": math.radians(camera.vfov), "znear": NEAR * distance}
+    lens = _LENSES[type(camera)](camera, distance, losses)
     index = nodes.builder.add("cameras", {"type": camera.type, camera.type: lens})
     nodes.add({"camera": index}, None, matrix)
 
 
+def _perspective(camera: PerspectiveCamera, distance: float, losses: Losses) -> Tree:
+    if camera.aperture_radius > 0:
+        losses.add("/camera/aperture_radius", "glTF's cameras have no depth of field: everything is sharp")
+    return {"yfov": math.radians(camera.vfov), "znear": NEAR * distance}
+
+
+def _orthographic(camera: OrthographicCamera, distance: float, losses: Losses) -> Tree:
+    half = camera.height / 2
+    return {"xmag": half, "ymag": half, "znear": 0.0, "zfar": FAR * distance}
+
+
+_LENSES: dict[type[AnyCamera], Callable[[Any, float, Losses], Tree]] = {
+    PerspectiveCamera: _perspective, OrthographicCamera: _orthographic,
+}  # fmt: skip
 _CAMERA = ("position", "target", "up", "vfov", "aperture_radius", "focus_distance", "height", "type")
 
 
 def add_lights(scene: Scene, nodes: Nodes, losses: Losses) -> None:
     listed: list[Tree] = []
     for i, light in enumerate(scene.lights):
+        if type(light) not in _LIGHTS:
+            losses.add(f"/lights/{i}", f"glTF has no {light.type} lights: it is left out")
+            continue
+        used = nodes.builder.extension("KHR_lights_punctual", {"light": len(listed)})
         listed.append(_light(light, f"/lights/{i}", losses))
-        used = nodes.builder.extension("KHR_lights_punctual", {"light": i})
         nodes.add({"extensions": used}, light, _light_matrix(light))
     if listed:
         nodes.builder.tree["extensions"] = nodes.builder.extension("KHR_lights_punctual", {"lights": listed})
@@ -105,25 +119,39 @@ def add_lights(scene: Scene, nodes: Nodes, losses: Losses) -> None:
 
 def _light(light: Light, pointer: str, losses: Losses) -> Tree:
     """A watt per steradian counts as a candela, a watt per square metre as a lux: the importer has it so, too."""
-    power = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
+    power, more = _LIGHTS[type(light)](light, pointer, losses)
     brightest = max(power)
     # A power of two, so that colour and intensity multiply to the very numbers of the document.
     intensity = 2.0 ** math.ceil(math.log2(brightest)) if brightest > 0 else 0.0
     color = [each / intensity for each in power] if brightest > 0 else [1.0, 1.0, 1.0]
-    made: Tree = {"type": light.type, "color": color, "intensity": intensity}
-    if isinstance(light, SpotLight):
-        inner, outer = math.radians(light.inner_angle), math.radians(light.outer_angle)
-        if inner >= outer:
-            losses.add(f"{pointer}/inner_angle", "the sharp edge of the cone becomes a fade over a millionth of it")
-            outer = max(outer, 1e-6)
-            inner = SHARP * outer
-        made["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
+    made: Tree = {"type": light.type, "color": color, "intensity": intensity, **more}
     for name in sorted(light.model_fields_set - _LIGHT):
         if getattr(light, name) not in (type(light).model_fields[name].default, None):
             losses.add(f"{pointer}/{name}", _DETAILS.get(name, "this has no place in glTF and is left out"))
     return made
 
 
+def _point(light: PointLight, pointer: str, losses: Losses) -> tuple[Vec3, Tree]:
+    return light.intensity, {}
+
+
+def _spot(light: SpotLight, pointer: str, losses: Losses) -> tuple[Vec3, Tree]:
+    inner, outer = math.radians(light.inner_angle), math.radians(light.outer_angle)
+    if inner >= outer:
+        losses.add(f"{pointer}/inner_angle", "the sharp edge of the cone becomes a fade over a millionth of it")
+        outer = max(outer, 1e-6)
+        inner = SHARP * outer
+    return light.intensity, {"spot": {"innerConeAngle": inner, "outerConeAngle": outer}}
+
+
+def _directional(light: DirectionalLight, pointer: str, losses: Losses) -> tuple[Vec3, Tree]:
+    return light.irradiance, {}
+
+
+# The strength of each kind of light, and what glTF says of it besides.
+_LIGHTS: dict[type[Light], Callable[[Any, str, Losses], tuple[Vec3, Tree]]] = {
+    PointLight: _point, SpotLight: _spot, DirectionalLight: _directional,
+}  # fmt: skip
 _LIGHT = {"type", "name", "position", "direction", "intensity", "irradiance", "inner_angle", "outer_angle"}
 _DETAILS = {"angular_diameter": "glTF's distant lights have no size: shadows get sharp"}
 

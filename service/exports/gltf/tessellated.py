@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, SphereShape
+from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
 from service.formats.types import Doubles, Indices
 from service.pack.geometry.analytic import CUBE_CAPS, CUBE_FACES, across
 
@@ -29,28 +31,15 @@ class Tessellated:
     uvs: Doubles  # v pointing up
     normals: Doubles | None  # None: flat
     matrix: Doubles
-    kind: str
+    is_sheet: bool = False  # its back can be seen
 
 
-def tessellated(shape: SphereShape | QuadShape | DiskShape | CylinderShape | BoxShape) -> Tessellated:
-    """The shape without its transform."""
-    match shape:
-        case SphereShape():
-            return _sphere(np.array(shape.center), shape.radius)
-        case BoxShape():
-            return _box(np.array(shape.min), np.array(shape.max))
-        case QuadShape():
-            origin, u, v = (np.array(each, float) for each in (shape.origin, shape.u, shape.v))
-            vertices = origin + CORNERS[:, :1] * u + CORNERS[:, 1:] * v
-            key = ("quad", *shape.origin, *shape.u, *shape.v)
-            return Tessellated(key, vertices, _whole(HALVES), CORNERS, None, np.eye(4), "quad")
-        case DiskShape():
-            return _disk(np.array(shape.center), np.array(shape.normal), shape.radius)
-        case CylinderShape():
-            return _cylinder(shape)
+def tessellated(shape: Shape) -> Tessellated:
+    """The shape, which is no mesh, without its transform."""
+    return _KINDS[type(shape)](shape)
 
 
-def _sphere(center: Doubles, radius: float) -> Tessellated:
+def _sphere(shape: SphereShape) -> Tessellated:
     """Rings from the south pole to the north; u = 1/2 + atan2(x, z) / (2 pi), v = 1 - acos(y) / pi. The last vertex
     of a ring repeats the first with u = 1, and at a pole each triangle has a vertex of its own."""
     u, v = np.meshgrid(np.arange(AROUND + 1) / AROUND, np.arange(UPWARD + 1) / UPWARD)
@@ -67,30 +56,38 @@ def _sphere(center: Doubles, radius: float) -> Tessellated:
     last = j == UPWARD - 1
     lower, upper = np.stack([a, b, np.where(last, d, d + 1)], axis=1)[j > 0], np.stack([a, d + 1, d], axis=1)[~last]
     flat = points.reshape(-1, 3)
-    matrix = np.diag([radius, radius, radius, 1.0])
-    matrix[:3, 3] = center
+    matrix = np.diag([shape.radius, shape.radius, shape.radius, 1.0])
+    matrix[:3, 3] = shape.center
     faces = _whole(np.concatenate([lower, upper]))
-    return Tessellated(("sphere",), flat, faces, uvs.reshape(-1, 2), flat, matrix, "sphere")
+    return Tessellated(("sphere",), flat, faces, uvs.reshape(-1, 2), flat, matrix)
 
 
-def _box(low: Doubles, high: Doubles) -> Tessellated:
+def _box(shape: BoxShape) -> Tessellated:
+    low, high = np.array(shape.min), np.array(shape.max)
     vertices = FACES[:, :1] + CORNERS[:, :1] * FACES[:, 1:2] + CORNERS[:, 1:] * FACES[:, 2:]
     faces = np.concatenate([HALVES + 4 * k for k in range(len(FACES))])
     matrix = np.diag([*((high - low) / 2), 1.0])
     matrix[:3, 3] = (low + high) / 2
     uvs = np.tile(CORNERS, (len(FACES), 1))
-    return Tessellated(("box",), vertices.reshape(-1, 3), _whole(faces), uvs, None, matrix, "box")
+    return Tessellated(("box",), vertices.reshape(-1, 3), _whole(faces), uvs, None, matrix)
 
 
-def _disk(center: Doubles, normal: Doubles, radius: float) -> Tessellated:
-    """In the plane of `normal`, with the coordinates of the square around it."""
-    right, up = across((normal[0], normal[1], normal[2]))
+def _quad(shape: QuadShape) -> Tessellated:
+    origin, u, v = (np.array(each, float) for each in (shape.origin, shape.u, shape.v))
+    vertices = origin + CORNERS[:, :1] * u + CORNERS[:, 1:] * v
+    key = ("quad", *shape.origin, *shape.u, *shape.v)
+    return Tessellated(key, vertices, _whole(HALVES), CORNERS, None, np.eye(4), is_sheet=True)
+
+
+def _disk(shape: DiskShape) -> Tessellated:
+    """In the plane of its normal, with the coordinates of the square around it."""
+    right, up = across(shape.normal)
     flat, faces = _fan()
     vertices = np.column_stack([flat, np.zeros(len(flat))])
     matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([right, up, np.cross(right, up)], axis=1) * radius
-    matrix[:3, 3] = center
-    return Tessellated(("disk",), vertices, _whole(faces), (flat + 1) / 2, None, matrix, "disk")
+    matrix[:3, :3] = np.stack([right, up, np.cross(right, up)], axis=1) * shape.radius
+    matrix[:3, 3] = shape.center
+    return Tessellated(("disk",), vertices, _whole(faces), (flat + 1) / 2, None, matrix, is_sheet=True)
 
 
 def _fan() -> tuple[Doubles, np.ndarray]:
@@ -125,9 +122,14 @@ def _cylinder(shape: CylinderShape) -> Tessellated:
     matrix[:3, 3] = np.array(shape.base) + np.array(shape.axis) / 2
     return Tessellated(
         ("cylinder", shape.caps), np.concatenate(vertices), _whole(np.concatenate(faces)), np.concatenate(uvs),
-        np.concatenate(normals), matrix, "cylinder",
+        np.concatenate(normals), matrix, is_sheet=not shape.caps,
     )  # fmt: skip
 
 
 def _whole(faces: np.ndarray) -> Indices:
     return faces.astype(np.int32)
+
+
+_KINDS: dict[type[Shape], Callable[[Any], Tessellated]] = {
+    SphereShape: _sphere, QuadShape: _quad, DiskShape: _disk, CylinderShape: _cylinder, BoxShape: _box,
+}  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from inspect import get_annotations
+
 import numpy as np
 
 from service.document import Scene
@@ -18,13 +20,6 @@ from service.exports.losses import Losses
 from service.exports.writing import Exported, Files, Limits
 from service.problems import escaped
 
-HOW = {
-    "sphere": "the sphere is written as {count} triangles",
-    "cylinder": "the cylinder is written as {count} triangles",
-    "disk": "the disk is written as {count} triangles",
-    "box": "the box is written as {count} triangles",
-    "quad": "the quad is written as {count} triangles",
-}
 UNLIT = {"extras": {"sunbox": {"environment": "none"}}}  # our importer puts no sky around the scene then
 
 
@@ -93,8 +88,8 @@ class _Writer:
             solid = tessellated(shape)
             part, matrix = self.meshes.of_solid(solid, i), matrix @ solid.matrix
             double = True
-            self.losses.add(pointer, HOW[solid.kind].format(count=len(solid.faces)))
-            if single and (solid.kind in ("quad", "disk") or getattr(shape, "caps", True) is False):
+            self.losses.add(pointer, f"the {shape.type} is written as {len(solid.faces)} triangles")
+            if single and solid.is_sheet:
                 self.losses.add(pointer, "it shines from its front alone, so glTF leaves out its back")
         double = double and not single
         for field in sorted(shape.model_fields_set & _LEFT_OUT.keys()):
@@ -106,7 +101,8 @@ class _Writer:
         self.nodes.add({"mesh": self._mesh(part, self.materials.index(name, asked))}, shape, matrix)
 
     def _others(self, shape: Shape, pointer: str) -> None:
-        for field in sorted(shape.model_fields_set - _WRITTEN - _LEFT_OUT.keys()):
+        written = _WRITTEN if isinstance(shape, MeshShape) else _WRITTEN | get_annotations(type(shape)).keys()
+        for field in sorted(shape.model_fields_set - written - _LEFT_OUT.keys()):
             if getattr(shape, field) not in (type(shape).model_fields[field].default, None):
                 self.losses.add(f"{pointer}/{field}", "this has no place in glTF and is left out")
 
@@ -120,6 +116,6 @@ class _Writer:
 
 _LEFT_OUT = {"visible_to_camera": "glTF cannot hide a shape from the camera alone; it is seen"}
 _WRITTEN = {
-    "type", "name", "material", "transform", "center", "radius", "normal", "origin", "u", "v", "min", "max", "base",
-    "axis", "caps", "asset", "vertices", "faces", "normals", "uvs", "colors", "smooth", "double_sided",
+    "type", "name", "material", "transform", "asset", "vertices", "faces", "normals", "uvs", "colors", "smooth",
+    "double_sided",
 }  # fmt: skip

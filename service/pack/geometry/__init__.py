@@ -4,6 +4,7 @@ assemble          the geometry of a whole scene, with parts of earlier ones
 geometry          the dataclass of the result, and the finished arrays of all triangles
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
+shape_kinds       a row for each kind of shape but meshes: what it becomes of these, and what others ask of it
 meshes            meshes in world space, and their triangles as records
 displacement      meshes that a height moves, cut until their edges are short enough
 vertex_normals    smooth normals at the corners, and their codes

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from gpu import layout
 from service.document.numbers import LARGEST
 from service.problems import FieldError, InvalidDocument
 
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
+Used = tuple[int, int]  # indices of a shape's material and of the shape
+Reach = Callable[[np.ndarray], np.ndarray]  # columns (3, 3) of world from object -> how far the solid reaches, (3,)
 
 SAME_SCALE = 1e-6  # relative difference of scales up to which a sphere stays a sphere: typed matrices have 7 digits
 SLACK = 2.0  # a box or an edge may reach from one end of the range of coordinates to the other
@@ -32,17 +34,34 @@ CUBE_FACES = (
 CUBE_CAPS = CUBE_FACES[4:]  # those at the ends of its y axis
 
 
+def cube_reach(axes: np.ndarray) -> np.ndarray:
+    """How far the cube [-1, 1]^3 reaches along the world's axes: the sum of its own axes' parts."""
+    return np.asarray(np.abs(axes).sum(axis=1))
+
+
+def ball_reach(axes: np.ndarray) -> np.ndarray:
+    """How far the unit sphere reaches: the length of its axes' parts."""
+    return np.asarray(np.linalg.norm(axes, axis=1))
+
+
+def pipe_reach(axes: np.ndarray) -> np.ndarray:
+    """How far the cylinder in the cube about its y axis reaches: as its cross-section and its axis together."""
+    return np.asarray(np.hypot(axes[:, 0], axes[:, 2]) + np.abs(axes[:, 1]))
+
+
 @dataclass
 class Solids:
-    """Affine images of the unit sphere, of the cube [-1, 1]^3 or of the cylinder in it."""
+    """Affine images of the unit sphere, of the cube [-1, 1]^3 or of a shape in it."""
 
     centers: list[Vec3] = field(default_factory=list)
     axes: list[np.ndarray] = field(default_factory=list)  # (3, 3) world from object
-    used: list[tuple[int, int]] = field(default_factory=list)  # material, shape
-    bits: list[int] = field(default_factory=list)  # of a cylinder: layout.ROUND, and OPEN where it has no caps
+    used: list[Used] = field(default_factory=list)
+    bits: list[int] = field(default_factory=list)  # of `layout.SHAPE_BITS`, that say which shape it is
+    reaches: list[np.ndarray] = field(default_factory=list)  # half the sides of its box in the world
 
-    def add(self, center: np.ndarray, axes: np.ndarray, used: tuple[int, int], bits: int = 0) -> None:
+    def add(self, center: np.ndarray, axes: np.ndarray, used: Used, bits: int, reach: Reach) -> None:
         self.centers.append(tuple(center))
+        self.reaches.append(reach(axes))
         self.axes.append(axes)
         self.used.append(used)
         self.bits.append(bits)
@@ -53,15 +72,15 @@ class AnalyticShapes:
     """The analytic shapes of a scene, by kind, in the document's order. `used` holds (material, shape) indices."""
 
     spheres: list[tuple[Vec3, float, Quaternion]] = field(default_factory=list)
-    spheres_used: list[tuple[int, int]] = field(default_factory=list)
+    spheres_used: list[Used] = field(default_factory=list)
     quads: list[tuple[Vec3, Vec3, Vec3, bool]] = field(default_factory=list)  # origin, u, v, mirrored
-    quads_used: list[tuple[int, int]] = field(default_factory=list)
+    quads_used: list[Used] = field(default_factory=list)
     quads_round: list[bool] = field(default_factory=list)  # disks: of the quad only the ellipse in it is there
     boxes: Solids = field(default_factory=Solids)
     ellipsoids: Solids = field(default_factory=Solids)
     vanished: list[int] = field(default_factory=list)  # shapes too small to be traced
 
-    def sphere(self, center: Vec3, radius: float, matrix: np.ndarray | None, used: tuple[int, int]) -> None:
+    def sphere(self, center: Vec3, radius: float, matrix: np.ndarray | None, used: Used) -> None:
         if matrix is None:
             if self._fits(used, center, radius):
                 self._add_sphere(center, radius, (0.0, 0.0, 0.0, 1.0), used)
@@ -75,21 +94,14 @@ class AnalyticShapes:
         if scale > 0 and np.abs(turn.T @ turn - np.eye(3)).max() < SAME_SCALE:
             self._add_sphere(tuple(middle), scale * radius, quaternion(turn), used)
         else:
-            self.ellipsoids.add(middle, axes * radius, used)
+            self.ellipsoids.add(middle, axes * radius, used, 0, ball_reach)
 
-    def _add_sphere(self, center: Vec3, radius: float, rotation: Quaternion, used: tuple[int, int]) -> None:
+    def _add_sphere(self, center: Vec3, radius: float, rotation: Quaternion, used: Used) -> None:
         self.spheres.append((center, radius, rotation))
         self.spheres_used.append(used)
 
-    def disk(
-        self, center: Vec3, normal: Vec3, radius: float, matrix: np.ndarray | None, used: tuple[int, int]
-    ) -> None:
-        right, up = across(normal)
-        u, v = 2 * radius * right, 2 * radius * up
-        self.quad(tuple(center - (u + v) / 2), tuple(u), tuple(v), matrix, used, is_round=True)
-
     def quad(
-        self, origin: Vec3, u: Vec3, v: Vec3, matrix: np.ndarray | None, used: tuple[int, int], is_round: bool = False
+        self, origin: Vec3, u: Vec3, v: Vec3, matrix: np.ndarray | None, used: Used, is_round: bool = False
     ) -> None:
         mirrored = False
         if matrix is not None:
@@ -101,38 +113,14 @@ class AnalyticShapes:
             self.quads_used.append(used)
             self.quads_round.append(is_round)
 
-    def box(self, low: Vec3, high: Vec3, matrix: np.ndarray | None, used: tuple[int, int], emissive: bool) -> None:
-        """Add a box; one that shines becomes six quads, as lights are sampled face by face."""
-        placed = _cube(np.add(low, high) / 2, np.diag(np.subtract(high, low) / 2), matrix)
-        center, axes = placed[:3, 3], placed[:3, :3]
-        if not self._fits(used, center, *np.linalg.norm(axes, axis=0)):
-            return
-        if not emissive:
-            self.boxes.add(center, axes, used)
-            return
-        for origin, u, v in CUBE_FACES:
-            self.quad(origin, u, v, placed, used)
+    def box(self, whole: np.ndarray, used: Used, bits: int = 0, reach: Reach = cube_reach) -> None:
+        """Add a box, the image of the cube [-1, 1]^3 under `whole`, or what its bits say is there of it."""
+        self.boxes.add(whole[:3, 3], whole[:3, :3], used, bits, reach)
 
-    def cylinder(
-        self, ends: tuple[Vec3, Vec3], radius: float, caps: bool, matrix: np.ndarray | None, used: tuple[int, int],
-        emissive: bool,
-    ) -> None:  # fmt: skip
-        """Add a cylinder, whose `ends` are the middle of its base and the way from there to its top; one that shines
-        becomes its side and two disks, as lights are sampled face by face."""
-        base, along = ends
-        right, up = across(along)
-        axes = np.stack([radius * right, np.array(along) / 2, -radius * up], axis=1)
-        placed = _cube(np.add(base, np.array(along) / 2), axes, matrix)
-        center, axes = placed[:3, 3], placed[:3, :3]
-        if not self._fits(used, center, *np.linalg.norm(axes, axis=0)):
-            return
-        is_open = emissive or not caps
-        self.boxes.add(center, axes, used, layout.ROUND | (layout.OPEN if is_open else 0))
-        if emissive and caps:
-            for origin, u, v in CUBE_CAPS:
-                self.quad(origin, u, v, placed, used, is_round=True)
+    def box_fits(self, whole: np.ndarray, used: Used) -> bool:
+        return self._fits(used, whole[:3, 3], *np.linalg.norm(whole[:3, :3], axis=0))
 
-    def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
+    def _fits(self, used: Used, position: Vec3 | np.ndarray, *lengths: float) -> bool:
         """True if the shape is large enough for float32; records one that is not. Raises InvalidDocument where its
         transform puts it out of range."""
         check_reach(used[1], max(*map(abs, position), *lengths))
@@ -142,7 +130,7 @@ class AnalyticShapes:
         return True
 
 
-def _cube(center: np.ndarray, axes: np.ndarray, matrix: np.ndarray | None) -> np.ndarray:
+def cube(center: np.ndarray, axes: np.ndarray, matrix: np.ndarray | None) -> np.ndarray:
     """(4, 4): the map of the cube [-1, 1]^3 to one with this middle and these half edges, and on by `matrix`."""
     placed = np.eye(4)
     placed[:3, :3], placed[:3, 3] = axes, center

@@ -48,7 +48,7 @@ def rebase(placed: AnalyticShapes, meshes: MeshExtents) -> Rebased:
         found = records.analytic(placed, origin)
     spheres, _ = found[ShapeKind.SPHERE]  # the first kind
     records.only_vast(spheres, low, high)
-    records.mark_round(found, placed)  # last, as the numbers of the shapes were read above
+    records.mark_bits(found, placed)  # last, as the numbers of the shapes were read above
     exact = np.arange(len(owners)) < len(spheres)
     lost = [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     return Rebased(

@@ -75,21 +75,21 @@ def quads(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bound
     return records, (low, high)
 
 
-def mark_round(found: dict[ShapeKind, tuple[np.ndarray, Bounds]], placed: AnalyticShapes) -> None:
-    """Set the bits of the quads and boxes of which only the disk or the cylinder in them is there."""
+def mark_bits(found: dict[ShapeKind, tuple[np.ndarray, Bounds]], placed: AnalyticShapes) -> None:
+    """Set the bits of the quads and boxes of which only another shape in them is there."""
     found[ShapeKind.QUAD][0]["shape"] |= np.where(placed.quads_round, layout.ROUND, 0).astype(np.uint32)
     found[ShapeKind.BOX][0]["shape"] |= np.array(placed.boxes.bits, np.uint32)
 
 
 def boxes(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
-    return _solids(placed.boxes, origin, is_box=True)
+    return _solids(placed.boxes, origin)
 
 
 def ellipsoids(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
-    return _solids(placed.ellipsoids, origin, is_box=False)
+    return _solids(placed.ellipsoids, origin)
 
 
-def _solids(solids: Solids, origin: np.ndarray, is_box: bool) -> tuple[np.ndarray, Bounds]:
+def _solids(solids: Solids, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     records = _records(layout.Solid, solids.used)
     if not len(records):
         return records, _no_bounds()
@@ -97,12 +97,7 @@ def _solids(solids: Solids, origin: np.ndarray, is_box: bool) -> tuple[np.ndarra
     rows = np.linalg.inv(axes)
     records["center"] = center
     records["row_x"], records["row_y"], records["row_z"] = rows[:, 0], rows[:, 1], rows[:, 2]
-    # How far the shape reaches along a world axis: the sum of the object axes' parts for the cube, their length
-    # for the ball, and for the cylinder the one of its cross-section and the other along its axis.
-    ball, cube = np.linalg.norm(axes, axis=2), np.abs(axes).sum(axis=2)
-    pipe = np.hypot(axes[:, :, 0], axes[:, :, 2]) + np.abs(axes[:, :, 1])
-    is_round = np.array(solids.bits)[:, None] & layout.ROUND > 0
-    reach = np.where(is_round, pipe, cube if is_box else ball)
+    reach = np.array(solids.reaches)
     return records, (center - reach, center + reach)
 
 

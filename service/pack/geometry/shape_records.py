@@ -15,8 +15,9 @@ from service.document import Scene
 from service.document.medium import LARGEST_G, Medium
 from service.document.numbers import Vec3
 from service.document.procedural import NoiseTexture, RampInput, RampTexture
-from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
+from service.document.shape import MeshShape, Shape
 from service.document.texture import is_projected, references
+from service.pack.geometry.shape_kinds import KINDS
 from service.pack.geometry.warnings import OddMesh, counted
 from service.pack.geometry.world import ShapeMaterials
 from service.pack.lights import lights
@@ -27,7 +28,7 @@ def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
     hidden = np.array([not shape.visible_to_camera for shape in shapes], bool)
     if hidden.any():
         for array in records:
-            index = array["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.ROUND | layout.OPEN) & layout.NONE)
+            index = array["shape"] & np.uint32(~layout.SHAPE_BITS & layout.NONE)
             array["shape"] |= np.where(hidden[index], layout.HIDDEN, 0).astype(np.uint32)
 
 
@@ -73,19 +74,7 @@ def _is_solid(scene: Scene, texture: object) -> bool:
 
 
 def _middle(shape: Shape) -> Vec3:
-    match shape:
-        case SphereShape() | DiskShape():
-            return shape.center
-        case CylinderShape():
-            x, y, z = (a + b / 2 for a, b in zip(shape.base, shape.axis, strict=True))
-            return x, y, z
-        case BoxShape():
-            x, y, z = ((a + b) / 2 for a, b in zip(shape.min, shape.max, strict=True))
-            return x, y, z
-        case QuadShape():
-            return shape.origin
-        case _:
-            return 0.0, 0.0, 0.0
+    return (0.0, 0.0, 0.0) if isinstance(shape, MeshShape) else KINDS[type(shape)].middle(shape)
 
 
 def bodies(scene: Scene) -> np.ndarray:
@@ -116,7 +105,7 @@ def odd_media(scene: Scene, materials: np.ndarray, odd: Iterable[OddMesh]) -> tu
             continue
         if not clear[shape.material]:
             found.append((i, "it has a medium, which is not seen, as its material lets no light in"))
-        elif rims.get(i) or (isinstance(shape, CylinderShape) and not shape.caps):
+        elif rims.get(i) or (type(shape) in KINDS and KINDS[type(shape)].is_open(shape)):
             found.append((i, "it is open and has a medium: light that leaves by the opening stays in the medium"))
     return counted(found)
 

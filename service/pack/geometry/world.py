@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import SceneTooLarge
 from service.document.numbers import LARGEST
-from service.document.shape import BoxShape, CylinderShape, DiskShape, MeshShape, QuadShape, Shape, SphereShape
+from service.document.shape import MeshShape, Shape
 from service.formats import Assets, MeshData, MeshOddities
 from service.formats.read.mesh_checks import mesh_oddities
 from service.pack.geometry import instances, meshes
@@ -17,6 +17,7 @@ from service.pack.geometry.analytic import AnalyticShapes, check_reach
 from service.pack.geometry.displacement import Displacement, displaced
 from service.pack.geometry.instances import Instance, MeshRequest, SharedMesh, blank, shared_mesh
 from service.pack.geometry.meshes import Chart, PlacedMesh
+from service.pack.geometry.shape_kinds import KINDS
 from service.pack.geometry.warnings import OddMesh
 from service.pack.textures.heights import HeightField
 from service.pack.textures.uses import RequiredCharts
@@ -131,18 +132,7 @@ def place_analytic(shapes: Sequence[Shape], materials: ShapeMaterials) -> Analyt
         matrix, used = _matrix(shape), (numbers[shape.material], i)
         if 1 in materials.charts.get(shape.material, RequiredCharts()).uv_sets:
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only{WITHOUT}")
-        match shape:
-            case SphereShape():
-                placed.sphere(shape.center, shape.radius, matrix, used)
-            case QuadShape():
-                placed.quad(shape.origin, shape.u, shape.v, matrix, used)
-            case DiskShape():
-                placed.disk(shape.center, shape.normal, shape.radius, matrix, used)
-            case CylinderShape():
-                ends, emissive = (shape.base, shape.axis), shape.material in materials.emissive
-                placed.cylinder(ends, shape.radius, shape.caps, matrix, used, emissive)
-            case BoxShape():
-                placed.box(shape.min, shape.max, matrix, used, shape.material in materials.emissive)
+        KINDS[type(shape)].place(placed, shape, matrix, used, shape.material in materials.emissive)
     return placed
 
 
