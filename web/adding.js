@@ -6,20 +6,16 @@ import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { lampShape, standOf, subjectOf } from "./document/lamps.js";
+import { LIGHTS } from "./document/lights.js";
 import { isLamp } from "./document/emission.js";
 import { ballOf, floors, lookedAt, middle, sized, solids, standing, union, wayOut } from "./document/placing.js";
+import { KINDS } from "./document/shapes.js";
 import { moved } from "./document/transforms.js";
-import { add, cross, normalize, scale, turn } from "./lib/vector.js";
+import { add, normalize, scale, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
 const SMALL = 0.2; // of what is made here: what is smaller in the picture is not seen there
 const SUNS_APART = Math.PI / 6; // a copied sun shines from another side
-
-// The angles of a spot's beam that is as wide as what it is aimed at, in degrees.
-function beamAround(radius, distance) {
-  const angle = Math.min(60, (Math.atan2(radius, distance) * 180) / Math.PI);
-  return { inner_angle: Number(angle.toPrecision(2)), outer_angle: Number((1.4 * angle).toPrecision(2)) };
-}
 
 // A name like one that there is, with a number that is free: "Wheel 2".
 function another(name, all) {
@@ -77,12 +73,9 @@ export class Adder {
     const irradiance = await this.controller.irradianceFor(subject.shapes, toLight, view.exposure ?? 0);
     const power = (factor) => Number((irradiance * factor).toPrecision(2));
     const direction = toLight.map((x) => Number((-x).toPrecision(4)) + 0);
-    if (type === "directional") {
-      return acts.add("lights", this.#apart({ type, direction, irradiance: power(1), angular_diameter: 0.53 }));
-    }
-    if (type === "point" || type === "spot") {
-      const beam = type === "spot" ? { direction, ...beamAround(subject.radius, distance) } : {};
-      return acts.add("lights", this.#apart({ type, position, ...beam, intensity: power(distance * distance) }));
+    if (LIGHTS[type]) {
+      const { make } = LIGHTS[type];
+      return acts.add("lights", this.#apart(make({ position, direction, radius: subject.radius, distance, power })));
     }
     const material = fresh(title, acts.state.scene.materials);
     const { shape, area } = lampShape(type, stand, subject, material);
@@ -100,7 +93,7 @@ export class Adder {
     if (own && solids([own], this.acts.camera.position).length) return this.#put([copy], { own, around: await this.#surroundings() });
     // A floor or a wall comes in front of itself; what can't be measured goes aside.
     const away = isFlat(original)
-      ? normalize(original.normal ?? cross(original.u, original.v))
+      ? normalize(KINDS[original.type].normal(original))
       : axes(this.acts.camera).right;
     return this.acts.add(kind, moved(copy, scale(away, this.controller.radius())));
   }

@@ -1,46 +1,10 @@
 // The ball around a shape, as far as its document or what was uploaded here tells; other files of triangles are
 // measured in the picture.
 
-import { add, cross, dot, length, mix, normalize, scale, subtract } from "../lib/vector.js";
-
-const radians = (degrees) => (degrees * Math.PI) / 180;
-
-// A place after the shape's transform: T Rz Ry Rx S, or a matrix by rows.
-export function place(point, transform) {
-  if (!transform) return point;
-  if (transform.matrix) {
-    const m = transform.matrix;
-    return [0, 4, 8].map((r) => m[r] * point[0] + m[r + 1] * point[1] + m[r + 2] * point[2] + m[r + 3]);
-  }
-  const { translate = [0, 0, 0], rotate = [0, 0, 0], scale: factor = 1 } = transform;
-  const factors = typeof factor === "number" ? [factor, factor, factor] : factor;
-  let [x, y, z] = point.map((value, i) => value * factors[i]);
-  const [a, b, c] = rotate.map(radians);
-  [y, z] = [y * Math.cos(a) - z * Math.sin(a), y * Math.sin(a) + z * Math.cos(a)];
-  [x, z] = [x * Math.cos(b) + z * Math.sin(b), z * Math.cos(b) - x * Math.sin(b)];
-  [x, y] = [x * Math.cos(c) - y * Math.sin(c), x * Math.sin(c) + y * Math.cos(c)];
-  return add([x, y, z], translate);
-}
-
-// Where a place was before the shape's transform.
-export function unplace(point, transform) {
-  const origin = place([0, 0, 0], transform);
-  const [x, y, z] = [0, 1, 2].map((k) =>
-    subtract(
-      place(
-        origin.map((_, i) => Number(i === k)),
-        transform,
-      ),
-      origin,
-    ),
-  );
-  const way = subtract(point, origin);
-  const volume = dot(x, cross(y, z));
-  return [cross(y, z), cross(z, x), cross(x, y)].map((across) => dot(way, across) / volume);
-}
-
-const corners = (low, high) =>
-  Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
+import { place, unplace } from "./placement.js";
+import { KINDS } from "./shapes.js";
+import { corners } from "./rays.js";
+import { add, length, mix, scale, subtract } from "../lib/vector.js";
 
 const measured = new Map(); // the corners of uploaded meshes, by asset
 
@@ -62,25 +26,6 @@ export function learn(shapes, describe) {
   return Promise.all(shapes.map(({ asset }) => asked.get(asset)));
 }
 
-// Where a sphere's box touches it, also where its transform makes an ellipsoid of it.
-function touches({ center, radius, transform }) {
-  const origin = place([0, 0, 0], transform);
-  const columns = [0, 1, 2].map((k) =>
-    subtract(
-      place(
-        origin.map((_, i) => Number(i === k)),
-        transform,
-      ),
-      origin,
-    ),
-  );
-  const middle = place(center, transform);
-  return [0, 1, 2].flatMap((k) => {
-    const reach = radius * length(columns.map((column) => column[k]));
-    return [-reach, reach].map((way) => middle.map((x, i) => x + (i === k ? way : 0)));
-  });
-}
-
 const seen = new Map(); // the corners of what was seen of other meshes, by asset
 
 // Takes over which points of a mesh can be seen in the picture: all that is known of one that was not uploaded here.
@@ -90,43 +35,10 @@ export function see({ asset, transform }, cloud) {
 }
 
 // What is flat by its kind: a floor, a wall, a panel.
-export const isFlat = ({ type }) => type === "quad" || type === "disk";
+export const isFlat = ({ type }) => Boolean(KINDS[type].isFlat);
 
-const RIM = 32; // points on a rim, whose box is half a per cent too small at most
-
-// The unit axes of a disk or a cylinder before its transform: two across its normal or its axis, and that.
-export function roundAxes({ normal, axis }) {
-  const n = normalize(normal ?? axis);
-  const right = Math.hypot(n[0], n[2]) > 1e-6 ? normalize([n[2], 0, -n[0]]) : [1, 0, 0];
-  return [right, cross(n, right), n];
-}
-
-// Points on the rim of a disk, or of a cylinder's base, before its transform.
-function rimOf(shape) {
-  const { center, base, radius } = shape;
-  const [right, up] = roundAxes(shape);
-  return Array.from({ length: RIM }, (_, i) => {
-    const angle = (2 * Math.PI * i) / RIM;
-    const way = add(scale(right, Math.cos(angle)), scale(up, Math.sin(angle)));
-    return add(center ?? base, scale(way, radius));
-  });
-}
-
-// The rims of a disk or a cylinder before its transform.
-export function rimsOf(shape) {
-  const rim = rimOf(shape);
-  return shape.axis ? [rim, rim.map((point) => add(point, shape.axis))] : [rim];
-}
-
-function points(shape) {
-  if (shape.type === "disk" || shape.type === "cylinder") return rimsOf(shape).flat();
-  if (shape.type === "box") return corners(shape.min, shape.max);
-  if (shape.type === "quad") {
-    const { origin, u, v } = shape;
-    return [origin, add(origin, u), add(origin, v), add(add(origin, u), v)];
-  }
-  return shape.vertices ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
-}
+// Points of a shape before its transform, or null where neither the document nor its file tells.
+const points = (shape) => KINDS[shape.type].points?.(shape) ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
 
 // {center, radius} of a cloud of points: around the middle of its box.
 export function around(cloud) {
@@ -136,7 +48,8 @@ export function around(cloud) {
 }
 
 function cloudOf(shape) {
-  if (shape.type === "sphere") return touches(shape);
+  const { touches } = KINDS[shape.type];
+  if (touches) return touches(shape);
   const cloud = points(shape);
   return cloud?.length ? cloud.map((point) => place(point, shape.transform)) : null;
 }
@@ -181,15 +94,14 @@ export function together(balls) {
   };
 }
 
-// {low, high} of a file's mesh before its transform, or null.
-export function meshBox({ asset }) {
-  const cloud = measured.get(asset) ?? seen.get(asset);
+// {low, high} of a mesh before its transform, or null.
+export function meshBox({ asset, vertices }) {
+  const cloud = vertices ?? measured.get(asset) ?? seen.get(asset);
   return cloud ? boxAround(cloud) : null;
 }
 
 // The longest side of a shape before its transform, in metres, or null where neither the document nor its file tells.
 export function ownExtent(shape) {
-  if (shape.type === "sphere") return 2 * shape.radius;
   const cloud = points(shape);
   if (!cloud?.length) return null;
   const { low, high } = boxAround(cloud);

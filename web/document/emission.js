@@ -1,5 +1,6 @@
 // What emits light, and how much.
 
+import { KINDS } from "./shapes.js";
 import { linear } from "../lib/color.js";
 import { at, isObject } from "../lib/patch.js";
 
@@ -17,11 +18,9 @@ export function emissionOf(material) {
 // Whether a shape of the scene emits light.
 export const isLamp = ({ materials }, { material }) => Math.max(...emissionOf(materials[material])) > 0;
 
-const SHAPES = ["quad", "disk", "cylinder", "sphere"]; // of lamps
-
 // Whether a thing is set as a lamp is: a light, or a shape as lamps are that emits.
 export function isSet(scene, thing) {
   if (thing.startsWith("/lights/")) return true;
   const shape = thing.startsWith("/shapes/") ? at(scene, thing) : null;
-  return Boolean(shape) && SHAPES.includes(shape.type) && isLamp(scene, shape);
+  return Boolean(shape) && Boolean(KINDS[shape.type].lamp) && isLamp(scene, shape);
 }

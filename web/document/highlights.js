@@ -1,7 +1,8 @@
 // Where a light has to stand for its reflection to lie at a point of the picture.
 
-import { isLight, shifted, wrapped } from "./manipulation.js";
 import { positionOf, swung } from "./lamps.js";
+import { isLight } from "./lights.js";
+import { shifted, wrapped } from "./manipulation.js";
 import { add, dot, length, normalize, scale, subtract } from "../lib/vector.js";
 
 // The unit direction from which a mirror at a point sends light along the ray that came from the eye. The normal may be

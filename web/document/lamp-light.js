@@ -1,11 +1,13 @@
 // A lamp as a photographer sets it: its colour and power, its size, its distance from what it shines at, and how soft it is.
 // Nothing here changes its arguments.
 
-import { place, roundAxes } from "./bounds.js";
 import { NITS, emissionOf } from "./emission.js";
 import { farther, positionOf, targetOf } from "./lamps.js";
-import { growing, isLight, mapped, stretching } from "./manipulation.js";
+import { LIGHTS, isLight } from "./lights.js";
+import { growing, mapped, stretching } from "./manipulation.js";
 import { users } from "./materials.js";
+import { place } from "./placement.js";
+import { KINDS } from "./shapes.js";
 import { linear } from "../lib/color.js";
 import { at, put } from "../lib/patch.js";
 import { add, length, normalize, scale, subtract, tidy } from "../lib/vector.js";
@@ -18,7 +20,7 @@ const bright = (rgb) => rgb.reduce((sum, x, i) => sum + LUMINANCE[i] * x, 0);
 
 // What holds its strength: the name of a light's own field.
 export const strengthName = ({ type }) =>
-  ({ point: "intensity", spot: "intensity", directional: "irradiance" })[type] ?? "emission";
+  LIGHTS[type]?.strength ?? "emission";
 
 // Its strength as linear [r, g, b] in its unit.
 export const lightOf = (scene, document) =>
@@ -52,13 +54,10 @@ export function tinted(rgb, tint) {
 
 export const power = bright;
 
-// Edges and axes of a shape in the scene.
-function spans({ type, u, v, axis, radius, transform, ...shape }) {
-  const origin = place([0, 0, 0], transform);
-  const way = (vector) => subtract(place(vector, transform), origin);
-  if (type === "quad") return { u: way(u), v: way(v) };
-  const side = type === "sphere" ? [1, 0, 0] : roundAxes({ axis, ...shape })[0];
-  return { ...(axis ? { axis: way(axis) } : {}), radius: length(way(scale(side, radius))) };
+// Edges, or the axis and the radius, of a shape in the scene.
+function spans(shape) {
+  const origin = place([0, 0, 0], shape.transform);
+  return KINDS[shape.type].lamp.spans(shape, (vector) => subtract(place(vector, shape.transform), origin));
 }
 
 // Its measures in metres: [{name, title, value}]; none of a point or a sun.
@@ -75,29 +74,17 @@ export function sizesOf(document) {
 }
 
 // The area that is seen of it from the front, m², and the side of a square as large.
-function areaOf(document) {
-  const [a, b] = sizesOf(document).map(({ value }) => value);
-  if (document.type === "quad") return a * b;
-  return document.type === "cylinder" ? 2 * a * b : Math.PI * a * a;
-}
+const areaOf = (document) => KINDS[document.type].lamp.facing(spans(document));
 
 // The shape with another measure, about its middle.
 function resized(document, name, value) {
   const before = sizesOf(document).find((each) => each.name === name).value;
   const factor = Math.max(value, FEWEST) / before;
-  const { u, v, axis } = spans(document);
+  const own = spans(document);
   const center = positionOf(document);
-  if (document.type === "cylinder" && !document.transform) {
-    if (name === "radius") return { ...document, radius: digits(document.radius * factor) };
-    const longer = scale(axis, factor);
-    return { ...document, base: tidy(subtract(center, scale(longer, 0.5))), axis: tidy(longer) };
-  }
-  if (u && !document.transform) {
-    const edges = { u: name === "width" ? scale(u, factor) : u, v: name === "height" ? scale(v, factor) : v };
-    const origin = tidy(subtract(center, scale(add(edges.u, edges.v), 0.5)));
-    return { ...document, origin, u: tidy(edges.u), v: tidy(edges.v) };
-  }
-  const along = { width: u, height: v, length: axis }[name];
+  const { resized: anew } = KINDS[document.type].lamp;
+  if (anew && !document.transform) return anew(document, name, factor, own, center);
+  const along = { width: own.u, height: own.v, length: own.axis }[name];
   return mapped(document, along ? stretching(normalize(along), factor) : growing(factor), center);
 }
 
@@ -137,27 +124,15 @@ export function withSoftness(scene, thing, { distance }, value) {
 
 export const softnessWords = (value) => (value < 0.15 ? "hard" : value < 0.5 ? "medium" : "soft");
 
-// From the axis of a beam to its edge: the solid angle that it fills evenly, in sr.
-function beam({ inner_angle: inner, outer_angle: outer }) {
-  const [a, b] = [inner, outer].map((angle) => Math.cos((angle * Math.PI) / 180));
-  return 2 * Math.PI * (1 - (a + b) / 2);
-}
-
 // What its strength is for each unit that a lamp's box has: {unit: factor}, of a strength's luminance in its own unit.
 export function photometry(scene, document) {
-  if (document.type === "directional") return { lx: NITS };
-  if (document.type === "point") return { lm: NITS * 4 * Math.PI, cd: NITS };
-  if (document.type === "spot") return { lm: NITS * beam(document), cd: NITS };
-  const isSheet = ["quad", "disk"].includes(document.type);
-  const sides = isSheet && scene.materials[document.material].emission_sides === "both" ? 2 : 1;
-  const { u, v, axis, radius } = spans(document);
-  const surface = u
-    ? length(u) * length(v)
-    : axis
-      ? 2 * Math.PI * radius * length(axis)
-      : (document.type === "sphere" ? 4 : 1) * Math.PI * radius * radius;
-  return { lm: NITS * Math.PI * surface * sides, nt: NITS };
+  if (isLight(document)) return scaled(LIGHTS[document.type].units(document));
+  const { isFlat, lamp } = KINDS[document.type];
+  const sides = isFlat && scene.materials[document.material].emission_sides === "both" ? 2 : 1;
+  return scaled({ lm: Math.PI * lamp.surface(spans(document)) * sides, nt: 1 });
 }
+
+const scaled = (units) => Object.fromEntries(Object.entries(units).map(([unit, factor]) => [unit, NITS * factor]));
 
 // The scene with another value of one of the lamp's own fields.
 export const withField = (scene, thing, name, value) => put(scene, `${thing}/${name}`, value);

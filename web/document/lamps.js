@@ -1,10 +1,14 @@
 // Lights as a photographer places them: aimed at a subject, from a side where none is yet.
 
-import { isFlat, ownBox, place, rimsOf } from "./bounds.js";
+import { isFlat, ownBox } from "./bounds.js";
 import { axes } from "./camera.js";
 import { isLamp } from "./emission.js";
-import { isLight, mapped, shifted } from "./manipulation.js";
+import { isLight } from "./lights.js";
+import { mapped, shifted } from "./manipulation.js";
+import { place } from "./placement.js";
 import { ballOf, middle, union } from "./placing.js";
+import { KINDS } from "./shapes.js";
+import { hit } from "./through.js";
 import { add, cross, dot, length, normalize, scale, subtract, tidy, turn } from "../lib/vector.js";
 
 // Where lamps stand about a subject, in degrees to the right of the camera and above the ground: a key light, a fill
@@ -24,21 +28,8 @@ const BEFORE = 0.85; // of the way to a wall that is in between
 const radians = (degrees) => (degrees * Math.PI) / 180;
 const rounded = (v) => v.map((x) => Number(x.toPrecision(4)) + 0);
 
-// How far along a ray from a point a flat shape is met, or Infinity.
-function wallAt(shape, from, direction) {
-  if (shape.type !== "quad") return Infinity;
-  const [origin, end, top] = [shape.origin, add(shape.origin, shape.u), add(shape.origin, shape.v)].map((point) =>
-    place(point, shape.transform),
-  );
-  const [u, v] = [subtract(end, origin), subtract(top, origin)];
-  const normal = cross(u, v);
-  const far = dot(subtract(origin, from), normal) / dot(direction, normal);
-  if (!(far > 0)) return Infinity;
-  const hit = subtract(add(from, scale(direction, far)), origin);
-  const area = dot(normal, normal);
-  const [a, b] = [dot(cross(hit, v), normal) / area, dot(cross(u, hit), normal) / area];
-  return a >= 0 && a <= 1 && b >= 0 && b <= 1 ? far : Infinity;
-}
+// How far along a ray from a point a wall is met, or Infinity.
+const wallAt = (shape, from, direction) => (KINDS[shape.type].isWall ? hit(shape, from, direction) : null) ?? Infinity;
 
 // What a new light is for: {center, radius, shapes}, the indices of its shapes: the selected thing, or where that is a lamp
 // or none, all things that are neither flat nor lamps; at last what the camera looks at.
@@ -88,33 +79,11 @@ export function standOf(scene, camera, { center, radius }) {
   return { position: rounded(add(center, scale(toLight, distance))), toLight, distance };
 }
 
-// A rectangle, a disk, a tube or a ball that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
-export function lampShape(type, { position, toLight }, { radius }, material) {
-  const side = SIDE * radius;
-  if (type === "sphere") {
-    const own = Number((side / 3).toPrecision(3));
-    return { shape: { type, center: position, radius: own, material }, area: Math.PI * own * own };
-  }
-  if (type === "disk") {
-    const own = Number((side / Math.sqrt(Math.PI)).toPrecision(3)); // as large as the rectangle
-    const normal = rounded(scale(toLight, -1));
-    return { shape: { type, center: position, normal, radius: own, material }, area: Math.PI * own * own };
-  }
-  if (type === "cylinder") {
-    // A tube that lies across the way to the subject: as long as two rectangles, and a sixteenth as thick.
-    const level = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
-    const radius = Number((side / 16).toPrecision(3));
-    const axis = rounded(scale(level, 2 * side));
-    const base = tidy(subtract(position, scale(axis, 0.5)));
-    return { shape: { type, base, axis, radius, material }, area: 2 * radius * length(axis) };
-  }
-  const flat = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
-  const u = scale(flat, side);
-  const v = scale(cross(toLight, flat), side);
-  const origin = subtract(position, scale(add(u, v), 0.5));
-  // The normal, u x v, leads from the subject to the lamp: turned round, as it shines to the outside.
-  const shape = { type: "quad", origin: tidy(add(origin, u)), u: tidy(scale(u, -1)), v: tidy(v), material };
-  return { shape, area: side * side };
+// A shape that shines from there at the subject: {shape, area}, the area in m² that the subject sees.
+export function lampShape(type, stand, { radius }, material) {
+  const { make, facing } = KINDS[type].lamp;
+  const shape = make(stand, SIDE * radius, material);
+  return { shape, area: facing(shape) };
 }
 
 // All lights of a scene, sources without extent and shapes that emit: [{thing, document}].
@@ -134,7 +103,7 @@ export function positionOf(document) {
 function aimOf(document) {
   if (document.direction) return normalize(document.direction);
   if (!isFlat(document) || document.transform) return null;
-  return normalize(document.normal ?? cross(document.u, document.v));
+  return normalize(KINDS[document.type].normal(document));
 }
 
 // What a light slides round: the body that it is aimed at, else the middle of all.
@@ -164,7 +133,7 @@ export function swung(document, target, arm, to) {
   const side = normalize(cross(after, [0, 1, 0]));
   const map = (v) => turn(turn(v, [0, 1, 0], yaw), side, above(to) - above(arm));
   // A ball that nothing was done to goes along as it is: no side of it is the front.
-  if (document.type === "sphere" && !document.transform) return shifted(document, subtract(map(arm), arm));
+  if (KINDS[document.type]?.isBall && !document.transform) return shifted(document, subtract(map(arm), arm));
   return mapped(document, map, target);
 }
 
@@ -188,26 +157,14 @@ export function farther(document, target, factor) {
   return from ? shifted(document, scale(subtract(from, target), factor - 1)) : document;
 }
 
-// A lamp's outline: {center, radius} of a ball, or {rings}, the polygons between which it lies: one of a flat shape, two of a
-// tube or a box; null where the document does not tell.
+// A lamp's outline: {center, radius} of a ball, or {rings}, the polygons between which it lies; null where the document
+// does not tell.
 export function outlineOf(document) {
   if (isLight(document)) return null;
+  const { isBall, rings } = KINDS[document.type];
   const own = ownBox(document);
-  if (document.type === "sphere") return own && { center: middle(own), radius: (own.high[0] - own.low[0]) / 2 };
-  const rings = ringsOf(document);
-  return rings && { rings: rings.map((ring) => ring.map((point) => place(point, document.transform))) };
-}
-
-function ringsOf(document) {
-  const { type, origin, u, v, min, max } = document;
-  if (type === "disk" || type === "cylinder") return rimsOf(document);
-  if (type === "quad") return [[origin, add(origin, u), add(add(origin, u), v), add(origin, v)]];
-  if (type !== "box") return null;
-  const [[x0, y0, z0], [x1, y1, z1]] = [min, max];
-  return [y0, y1].map((y) => [
-    [x0, y, z0],
-    [x1, y, z0],
-    [x1, y, z1],
-    [x0, y, z1],
-  ]);
+  if (isBall) return own && { center: middle(own), radius: (own.high[0] - own.low[0]) / 2 };
+  return rings
+    ? { rings: rings(document).map((ring) => ring.map((point) => place(point, document.transform))) }
+    : null;
 }

@@ -1,6 +1,8 @@
 // A thing of the scene moved, turned or scaled as a whole: a shape or a light, by a linear map about a pivot.
 
-import { place, roundAxes } from "./bounds.js";
+import { isLight } from "./lights.js";
+import { place } from "./placement.js";
+import { KINDS } from "./shapes.js";
 import { moved, parts } from "./transforms.js";
 import { add, cross, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
 
@@ -17,8 +19,6 @@ export const growing = (factor) => (v) => scale(v, factor);
 
 // An angle in degrees as one from -180 to 180.
 export const wrapped = (degrees) => Number((degrees - 360 * Math.round(degrees / 360)).toFixed(2)) + 0;
-
-export const isLight = ({ type }) => ["point", "spot", "directional"].includes(type);
 
 // By an offset in metres; what has no place stays as it is.
 export function shifted(thing, offset) {
@@ -57,24 +57,9 @@ export function mapped(thing, map, pivot) {
       ...(direction ? { direction: tidy(map(direction)) } : {}),
     };
   }
-  if (!thing.transform && thing.type === "quad") {
-    return { ...thing, origin: to(thing.origin), u: tidy(map(thing.u)), v: tidy(map(thing.v)) };
-  }
-  if (!thing.transform && thing.type === "disk" && similarity(map)) {
-    const factor = similarity(map);
-    const radius = Number((thing.radius * factor).toPrecision(7));
-    return { ...thing, center: to(thing.center), normal: tidy(scale(map(thing.normal), 1 / factor)), radius };
-  }
-  if (!thing.transform && thing.type === "cylinder" && similarity(map)) {
-    const radius = Number((thing.radius * similarity(map)).toPrecision(7));
-    return { ...thing, base: to(thing.base), axis: tidy(map(thing.axis)), radius };
-  }
-  if (!thing.transform && isDiagonal(map)) {
-    const factors = WORLD.map((axis, k) => map(axis)[k]);
-    if (thing.type === "box") return { ...thing, min: to(thing.min), max: to(thing.max) };
-    if (thing.type === "sphere" && factors.every((factor) => factor === factors[0]))
-      return { ...thing, center: to(thing.center), radius: Number((thing.radius * factors[0]).toPrecision(7)) };
-  }
+  const factors = isDiagonal(map) ? WORLD.map((axis, k) => map(axis)[k]) : null;
+  const own = thing.transform ? null : KINDS[thing.type].mapped?.(thing, { map, to, factor: similarity(map), factors });
+  if (own) return own;
   return { ...thing, transform: composed(thing.transform, map, pivot) };
 }
 
@@ -82,12 +67,8 @@ export function mapped(thing, map, pivot) {
 export function ownAxes(thing) {
   const { transform } = thing;
   const origin = place([0, 0, 0], transform);
-  let axes = WORLD.map((axis) => subtract(place(axis, transform), origin));
-  if (thing.type === "quad" && !transform) {
-    const [u, v] = [thing.u, thing.v];
-    axes = [u, v, [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]];
-  }
-  if ((thing.type === "disk" || thing.type === "cylinder") && !transform) axes = roundAxes(thing);
+  const turned = WORLD.map((axis) => subtract(place(axis, transform), origin));
+  const axes = (transform ? null : KINDS[thing.type]?.axes?.(thing)) ?? turned;
   const left = axes.map((axis) => scale(axis, 1 / length(axis)));
   return WORLD.map((_, k) => {
     const at = left.reduce((best, axis, i) => (Math.abs(axis[k]) > Math.abs(left[best][k]) ? i : best), 0);

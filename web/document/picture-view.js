@@ -1,5 +1,7 @@
 // What a picture on the page is to be: its size, its layer, and how its frames come.
 
+import { isAround } from "./camera.js";
+
 // What of a view is a matter of taste; the rest is how the stream carries it.
 export const DISPLAY = ["exposure", "tone_map"];
 
@@ -23,8 +25,8 @@ export function contained(box, { width, height }) {
 // Whether the picture on the page is as wide as its box, in which the final frame is a part of it; else it has the
 // frame's shape. A field of view is that of the height: a wider picture shows more to both sides, and nothing less. A
 // panorama shows everything, whatever its shape is.
-export const fillsBox = (box, frame, { type }) =>
-  type !== "panorama" && frame.width * box.height <= box.width * frame.height;
+export const fillsBox = (box, frame, camera) =>
+  !isAround(camera) && frame.width * box.height <= box.width * frame.height;
 
 // Pixels that a renderer traces fast enough to follow the hand. What is denoised has use for more than noise has.
 export function liveArea({ software }, isDenoised) {

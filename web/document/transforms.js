@@ -1,5 +1,6 @@
 // Where a shape stands: a matrix as the move, turn and scale that a person edits, and shapes that are moved.
 
+import { KINDS } from "./shapes.js";
 import { add, cross, dot, length, scale, tidy } from "../lib/vector.js";
 
 // The cosine between two axes up to which they count as perpendicular: files hold single precision, and a part's
@@ -57,12 +58,10 @@ export function moved(shape, offset) {
   const by = (point) => tidy(add(point, offset));
   const { matrix } = shape.transform ?? {};
   if (matrix) return { ...shape, transform: { matrix: translated(matrix, by([matrix[3], matrix[7], matrix[11]])) } };
-  if (shape.transform || shape.type === "mesh") {
+  const kind = KINDS[shape.type];
+  if (shape.transform || !kind.moved) {
     const { translate = [0, 0, 0] } = shape.transform ?? {};
     return { ...shape, transform: { ...shape.transform, translate: by(translate) } };
   }
-  if (shape.base) return { ...shape, base: by(shape.base) };
-  if (shape.center) return { ...shape, center: by(shape.center) };
-  if (shape.type === "box") return { ...shape, min: by(shape.min), max: by(shape.max) };
-  return { ...shape, origin: by(shape.origin) };
+  return kind.moved(shape, by);
 }

@@ -1,6 +1,7 @@
 // The form of the selected lamp, in a photographer's words: colour, power, size, distance, softness.
 
 import * as lamp from "../document/lamp-light.js";
+import { LIGHTS } from "../document/lights.js";
 import { amount } from "../forms/amounts.js";
 import { strengthControl } from "../forms/controls.js";
 import { schemaForm } from "../forms/schema-form.js";
@@ -67,7 +68,7 @@ export class LampPart {
       .map(([unit, factor]) => `${inThousands(brightness * factor)} ${UNITS[unit]}`)
       .join(" · ");
     const isShared = lamp.isShared(scene, document);
-    this.note.hidden = !isShared && !["point", "spot"].includes(document.type);
+    this.note.hidden = !isShared && !LIGHTS[document.type]?.isSharp;
     this.note.textContent = isShared ? HINTS.shared : "It has no size: its shadows are sharp.";
   }
 

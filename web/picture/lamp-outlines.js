@@ -1,6 +1,6 @@
 // How lamps lie in the picture: their outlines, in pixels, and where the marks of those outside of it stand.
 
-import { axes, project } from "../document/camera.js";
+import { axes, isAround, project } from "../document/camera.js";
 import { outlineOf } from "../document/lamps.js";
 import { dot, mix, subtract } from "../lib/vector.js";
 import { metresPerPixel } from "./handle-drags.js";
@@ -10,7 +10,7 @@ const EDGE = 0.04; // of the picture: how far inside of it a mark stays
 
 // The part of a polygon that is before the eye.
 function before(camera, ring) {
-  if (camera.type === "panorama") return ring;
+  if (isAround(camera)) return ring;
   const { forward, distance } = axes(camera);
   const depth = (point) => dot(subtract(point, camera.position), forward) - NEAR * distance;
   return ring.flatMap((point, i) => {

@@ -1452,14 +1452,51 @@ const forward=normalize(view);
 const right=normalize(cross(forward,up));
 return{right,up:cross(right,forward),forward,distance:length(view)};
 }
-function halfHeight({type,vfov,height},distance){
-if (type === "orthographic") return height / 2;
-return distance * (type === "panorama" ? Math.PI / 2 : Math.tan(radians(vfov) / 2));
-}
+const flat={
+project(camera,way,{right,up,forward},aspect){
+const z=dot(way,forward);
+const tall=halfHeight(camera,z);
+return { x: (dot(way, right) / (tall * aspect) + 1) / 2, y: (1 - dot(way, up) / tall) / 2, z };
+},
+};
+const across=(tall,x,y,{right,up},aspect)=>
+add(scale(right,(2 * x - 1)* tall * aspect),scale(up,(1 - 2 * y)* tall));
+const KINDS={
+perspective:{
+...flat,
+halfHeight: ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2),
+direction:(camera,x,y,frame,aspect)=>add(frame.forward,across(halfHeight(camera,1),x,y,frame,aspect)),
+},
+orthographic:{
+...flat,
+halfHeight: ({ height }) => height / 2,
+shown:(height)=>({height}),
+narrowed:({height},factor)=>({height:Number((height * factor).toPrecision(6))}),
+fitted:(height)=>({height:Number(height.toPrecision(4))}),
+offset:(camera,x,y,frame,aspect)=>across(halfHeight(camera,1),x,y,frame,aspect),
+direction:(_camera,_x,_y,{forward})=>forward,
+},
+panorama:{
+isAround:true,
+halfHeight: (_, distance) => (distance * Math.PI) / 2,
+project(_,way,{right,up,forward}){
+const [x,y,z]=[right,up,forward].map((axis)=>dot(way,axis));
+return { x: 0.5 + Math.atan2(x, z) / (2 * Math.PI), y: Math.atan2(Math.hypot(x, z), y) / Math.PI, z: length(way) };
+},
+direction(_,x,y,{right,up,forward}){
+const [azimuth,polar]=[2 * Math.PI *(x - 0.5),Math.PI * y];
+const level=add(scale(right,Math.sin(azimuth)),scale(forward,Math.cos(azimuth)));
+return add(scale(level,Math.sin(polar)),scale(up,Math.cos(polar)));
+},
+},
+};
+const kindOf=({type})=>KINDS[type] ?? KINDS.perspective;
+const isAround=(camera)=>Boolean(kindOf(camera).isAround);
+const halfHeight=(camera,distance)=>kindOf(camera).halfHeight(camera,distance);
 function turned(camera,type){
 const{position,target,up}=camera;
 const height=Number((2 * halfHeight(camera,axes(camera).distance)).toPrecision(3));
-return{type,position,target,up,...(type==="orthographic" ?{height}:{})};
+return{type,position,target,up,...KINDS[type].shown?.(height)};
 }
 function pan(camera,right,down){
 const{position,target}=camera;
@@ -1468,24 +1505,25 @@ const height=2 * halfHeight(camera,frame.distance);
 const shift=add(scale(frame.right,-right * height),scale(frame.up,down * height));
 return{position:tidy(add(position,shift)),target:tidy(add(target,shift))};
 }
-const zoom=({type,position,target,height},factor)=>
-type==="orthographic"
-?{height:Number((height * factor).toPrecision(6))}
-:{position:tidy(add(target,scale(subtract(position,target),factor)))};
+const zoom=(camera,factor)=>
+kindOf(camera).narrowed?.(camera,factor)??{
+position:tidy(add(camera.target,scale(subtract(camera.position,camera.target),factor))),
+};
 function frame(camera,{center,radius},aspect,share=0.8){
-const{type,position,target}=camera;
+const{position,target}=camera;
 const narrow=Math.min(1,aspect);
-if(type==="orthographic"){
-const back=scale(normalize(subtract(position,target)),Math.max(axes(camera).distance,2 * radius));
-const height = Number(((2 * radius) / (share * narrow)).toPrecision(4));
-return{position:tidy(add(center,back)),target:tidy(center),height};
-}
+const{fitted}=kindOf(camera);
 const half=Math.atan(halfHeight(camera,1)* narrow);
-const distance = radius / Math.sin(Math.max(half * share, 1e-3));
+const distance=fitted
+? Math.max(axes(camera).distance,2 * radius)
+: radius / Math.sin(Math.max(half * share, 1e-3));
 const back=normalize(subtract(position,target));
-return{position:tidy(add(center,scale(back,distance))),target:tidy(center)};
+const height = (2 * radius) / (share * narrow);
+return{position:tidy(add(center,scale(back,distance))),target:tidy(center),...fitted?.(height)};
 }
-return { axes, frame, halfHeight, orbit, pan, turned, zoom };
+const project=(camera,point,aspect)=>
+kindOf(camera).project(camera,subtract(point,camera.position),axes(camera),aspect);
+return { axes, frame, halfHeight, isAround, orbit, pan, project, turned, zoom };
 })();
 const picture_gestures = (() => {
 const ORBIT_PER_WIDTH=Math.PI;
