@@ -16,7 +16,7 @@ from gpu.kernels import caustics, media, textures_glsl
 from gpu.kernels.deltas import filmed, goes_straight, mirrors, transmits
 from gpu.kernels.flag import ANYWHERE, Asks, Flag
 from gpu.kernels.shape_kinds import records
-from gpu.layout import CameraKind, LightKind, ShapeKind, microfacet_records, texture_records
+from gpu.layout import CameraKind, LightKind, ShapeBit, ShapeKind, microfacet_records, texture_records
 from gpu.layout.measured_records import MeasuredKind
 from gpu.layout.models import BY_NUMBER, COATED, COVERING, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
@@ -35,7 +35,7 @@ def _tree(kind: ShapeKind) -> Asks:
 
 
 def _round(kind: ShapeKind) -> Asks:
-    return lambda s: bool((records(s, kind)["shape"] & np.uint32(layout.ROUND)).any())
+    return lambda s: bool((records(s, kind)["shape"] & np.uint32(ShapeBit.ROUND)).any())
 
 
 def _light(kind: LightKind) -> Asks:
@@ -51,7 +51,7 @@ def _sun_disks(s: SceneArrays) -> bool:
 
 
 def _hidden(s: SceneArrays) -> bool:
-    return any(bool((records(s, kind)["shape"] & np.uint32(layout.HIDDEN)).any()) for kind in ShapeKind)
+    return any(bool((records(s, kind)["shape"] & np.uint32(ShapeBit.HIDDEN)).any()) for kind in ShapeKind)
 
 
 def _any_of(models: Iterable[Model]) -> Asks:
@@ -247,7 +247,7 @@ _ROWS = (
     Flag("HAS_BVH_ELLIPSOIDS", _tree(ShapeKind.ELLIPSOID), in_general=False),
     Flag("HAS_BVH_TRIANGLES", _tree(ShapeKind.TRIANGLE)),
     Flag("HAS_INSTANCES", lambda s: len(s.instances) > 0, in_general=False),  # rare, and a cost for all other scenes
-    Flag("HAS_SINGLE_SIDED", lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any())),
+    Flag("HAS_SINGLE_SIDED", lambda s: bool((s.triangles["shape"] & np.uint32(ShapeBit.SINGLE_SIDED)).any())),
     Flag("HAS_SMOOTH_NORMALS", lambda s: len(s.triangle_normals) > 0),
     # Of meshes whose highlight is stretched, and which have smooth normals.
     Flag(

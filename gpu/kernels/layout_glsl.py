@@ -7,7 +7,7 @@ from gpu import layout
 from gpu.kernels import bodies_glsl, instances_glsl, measured_glsl, microfacets_glsl, models_glsl, textures_glsl
 from gpu.kernels.light_kinds import POINTS
 from gpu.kernels.words_glsl import unpacked
-from gpu.layout import CameraKind, LightKind, ShapeKind, Uniforms, bindings
+from gpu.layout import CameraKind, LightKind, ShapeBit, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, GuessSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.pixel_layers import COVER_RANKS
@@ -122,14 +122,11 @@ def constants() -> str:
     out.append(f"#define COVER_RANKS {COVER_RANKS}")
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
     out.append(f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}")
+    out += [f"const uint {bit.name} = {int(bit)}u;" for bit in ShapeBit]
     for name in (
         "NONE",
-        "SINGLE_SIDED",
         "SHAPE_BITS",
         "SOLID_BITS",
-        "HIDDEN",
-        "ROUND",
-        "OPEN",
         "NORMALS_SMOOTH",
         "NORMALS_LEFT",
         "TANGENT_SHIFT",

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
-from gpu.layout import ShapeKind
+from gpu.layout import ShapeBit, ShapeKind
 
 _GRID = 65535.0  # steps of a tree's grid
 _CORNERS = np.array([(1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)], float)  # one of each two that face each other
@@ -40,7 +40,7 @@ def quads_when_shining(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n,): the number of quads that each record of a box becomes when it begins to shine, and 1 where it is then no
     longer among the boxes."""
     bits = boxes["shape"]
-    is_round, is_open = (bits & np.uint32(layout.ROUND)) > 0, (bits & np.uint32(layout.OPEN)) > 0
+    is_round, is_open = (bits & np.uint32(ShapeBit.ROUND)) > 0, (bits & np.uint32(ShapeBit.OPEN)) > 0
     return np.where(is_round, np.where(is_open, 0, _CAPS), _FACES), (~is_round).astype(int)
 
 

@@ -19,19 +19,27 @@ ABSENT = -1.0  # a material's number that was not given
 LEAST_ROUGHNESS = 0.01  # a `principled` surface or coat with less is a mirror
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear Rec.709
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises the flags it may need
-SINGLE_SIDED = 0x80000000  # in Triangle.shape: rays that come from behind pass the triangle
-HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
-ROUND = 0x20000000  # in Quad.shape: only the ellipse that touches its four edges is there, which is a disk; in the
-# shape of a box: only the cylinder about its y axis that touches its faces
-OPEN = 0x10000000  # in the shape of a cylinder: it has no caps
-SOLID_BITS = ROUND | OPEN  # what says which shape the record of a box is
-SHAPE_BITS = SINGLE_SIDED | HIDDEN | SOLID_BITS  # all that stands beside the index of a shape
 # In TriangleNormals.bits: NORMALS_SMOOTH: the corners' normals are interpolated; NORMALS_LEFT: v grows to the right
 # of u, seen from outside. From TANGENT_SHIFT on follow three codes of TANGENT_BITS each: 0 for no tangent, else 1 +
 # its angle in the plane of the corner's normal, in steps. A step is 0.35 degrees, less than a normal map of 8 bits
 # resolves; a right angle is a whole number of steps.
 NORMALS_SMOOTH, NORMALS_LEFT = 1, 2
 TANGENT_SHIFT, TANGENT_BITS, TANGENT_STEPS = 2, 10, 1020
+
+
+class ShapeBit(IntEnum):
+    """Bits beside the index of a shape, in its records."""
+
+    SINGLE_SIDED = 0x80000000  # of a triangle: rays that come from behind pass it
+    HIDDEN = 0x40000000  # the camera looks through it
+    # Of a quad: only the ellipse that touches its four edges is there, which is a disk; of a box: only the cylinder
+    # about its y axis that touches its faces.
+    ROUND = 0x20000000
+    OPEN = 0x10000000  # of a cylinder: it has no caps
+
+
+SOLID_BITS = ShapeBit.ROUND | ShapeBit.OPEN  # those that say which shape the record of a box is
+SHAPE_BITS = ShapeBit.SINGLE_SIDED | ShapeBit.HIDDEN | SOLID_BITS
 
 
 class ShapeKind(IntEnum):

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from gpu import layout
+from gpu.layout import ShapeBit
 from service.pack.geometry.parallel import chunks, in_threads
 from service.pack.geometry.tangents import Tangents, codes, tangents
 from service.pack.geometry.vertex_normals import corner_normals, encode, split
@@ -154,7 +155,7 @@ class Triangles:
             mesh, record = self.meshes[number], np.empty(_count(which), layout.Triangle.dtype)
             record["v0"], record["v1"], record["v2"] = self._corners(number, which)
             record["material"], record["light"] = mesh.material, layout.NONE
-            record["shape"] = mesh.shape | (layout.SINGLE_SIDED if mesh.single_sided else 0)
+            record["shape"] = mesh.shape | (ShapeBit.SINGLE_SIDED if mesh.single_sided else 0)
             _words(out)[where] = _words(record)
 
         self._spread(places, some)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu import layout
-from gpu.layout import ShapeKind
+from gpu.layout import ShapeBit, ShapeKind
 from gpu.layout.record import Record
 from service.pack.geometry.analytic import AnalyticShapes, Solids
 
@@ -77,7 +77,7 @@ def quads(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bound
 
 def mark_bits(found: dict[ShapeKind, tuple[np.ndarray, Bounds]], placed: AnalyticShapes) -> None:
     """Set the bits of the quads and boxes of which only another shape in them is there."""
-    found[ShapeKind.QUAD][0]["shape"] |= np.where(placed.quads_round, layout.ROUND, 0).astype(np.uint32)
+    found[ShapeKind.QUAD][0]["shape"] |= np.where(placed.quads_round, ShapeBit.ROUND, 0).astype(np.uint32)
     found[ShapeKind.BOX][0]["shape"] |= np.array(placed.boxes.bits, np.uint32)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gpu import layout
+from gpu.layout import ShapeBit
 from service.document.numbers import Vec3
 from service.document.shape import BoxShape, CylinderShape, DiskShape, QuadShape, Shape, SphereShape
 from service.pack.geometry.analytic import CUBE_CAPS, CUBE_FACES, AnalyticShapes, Used, across, cube, pipe_reach
@@ -64,7 +64,7 @@ def _cylinder(
     if not placed.box_fits(whole, used):
         return
     is_open = emissive or not shape.caps
-    placed.box(whole, used, layout.ROUND | (layout.OPEN if is_open else 0), pipe_reach)
+    placed.box(whole, used, ShapeBit.ROUND | (ShapeBit.OPEN if is_open else 0), pipe_reach)
     if emissive and shape.caps:
         for origin, u, v in CUBE_CAPS:
             placed.quad(origin, u, v, whole, used, is_round=True)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from gpu import layout
-from gpu.layout import Body, ShapeKind, ShapeSpace
+from gpu.layout import Body, ShapeBit, ShapeKind, ShapeSpace
 from gpu.tables.half_space import single_scattering_albedo
 from service.document import Scene
 from service.document.medium import LARGEST_G, Medium
@@ -29,7 +29,7 @@ def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
     if hidden.any():
         for array in records:
             index = array["shape"] & np.uint32(~layout.SHAPE_BITS & layout.NONE)
-            array["shape"] |= np.where(hidden[index], layout.HIDDEN, 0).astype(np.uint32)
+            array["shape"] |= np.where(hidden[index], ShapeBit.HIDDEN, 0).astype(np.uint32)
 
 
 def area_lights(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import layout
+from gpu.layout import ShapeBit
 from gpu.layout.models import NUMBERS
 from service.document import parse_scene
 from service.pack import CacheBudget, PackCache, pack_camera, pack_materials
@@ -266,7 +267,7 @@ def test_quad_keeps_its_front_and_its_coordinates(transform):
 
 def test_shapes_know_the_document_and_single_sided_ones_say_so():
     triangles = packed(mesh(), mesh(double_sided=False)).arrays.triangles
-    assert sorted(triangles["shape"]) == 12 * [0] + 12 * [1 | layout.SINGLE_SIDED]
+    assert sorted(triangles["shape"]) == 12 * [0] + 12 * [1 | ShapeBit.SINGLE_SIDED]
 
 
 def test_too_small_to_trace_is_left_out_with_a_word():

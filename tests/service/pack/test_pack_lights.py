@@ -10,7 +10,7 @@ import pytest
 
 from gpu import layout
 from gpu.kernels.features import counts, flags
-from gpu.layout import LightKind, ShapeKind
+from gpu.layout import LightKind, ShapeBit, ShapeKind
 from service.pack.lights import light_bounds, lights
 from tests.documents import GREY, LAMP, Shelf, box, matrix_of, mesh, packed, picture, quad, sphere
 
@@ -295,9 +295,9 @@ def test_hidden_shapes_carry_their_bit(count):
     shapes += [mesh(double_sided=False, visible_to_camera=False), box(visible_to_camera=False), box()]
     arrays = packed(*shapes).arrays
     assert arrays.spheres["shape"].tolist() == [0]
-    assert sorted(arrays.quads["shape"].tolist()) == [layout.HIDDEN | i for i in range(1, count + 1)]
-    assert set(arrays.triangles["shape"].tolist()) == {layout.HIDDEN | layout.SINGLE_SIDED | (count + 1)}
-    assert arrays.boxes["shape"].tolist() == [layout.HIDDEN | (count + 2), count + 3]
+    assert sorted(arrays.quads["shape"].tolist()) == [ShapeBit.HIDDEN | i for i in range(1, count + 1)]
+    assert set(arrays.triangles["shape"].tolist()) == {ShapeBit.HIDDEN | ShapeBit.SINGLE_SIDED | (count + 1)}
+    assert arrays.boxes["shape"].tolist() == [ShapeBit.HIDDEN | (count + 2), count + 3]
 
 
 def test_each_light_and_each_way_to_pass_raises_its_flag():

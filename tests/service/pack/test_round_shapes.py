@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import layout
+from gpu.layout import ShapeBit
 from service.problems import InvalidDocument
 from tests.documents import GREY, LAMP, MIRRORED, matrix_of, packed, quad, sphere
 
@@ -19,7 +19,7 @@ def test_disk_is_the_round_in_a_square_that_stands_upright(transform, normal, ri
     disk = {"type": "disk", "center": [1, 2, 3], "normal": normal, "radius": 0.5, "material": "grey", **placed}
     arrays = packed(quad(), disk, {**disk, "visible_to_camera": False}).arrays
     _, record, _hidden = arrays.quads
-    assert arrays.quads["shape"].tolist() == [0, layout.ROUND | 1, layout.ROUND | layout.HIDDEN | 2]
+    assert arrays.quads["shape"].tolist() == [0, ShapeBit.ROUND | 1, ShapeBit.ROUND | ShapeBit.HIDDEN | 2]
     matrix = np.eye(4) if transform is None else matrix_of(transform)
     outward = np.linalg.inv(matrix[:3, :3]).T @ normal
     np.testing.assert_allclose(record["normal"], outward / np.linalg.norm(outward), atol=1e-6)
@@ -47,8 +47,8 @@ def test_cylinder_is_the_round_in_a_box(transform, emissive, caps):
     }
     materials = {"grey": GREY, "lamp": LAMP}
     arrays = packed(sphere(), {**pipe, **placed}, {**pipe, "visible_to_camera": False}, materials=materials).arrays
-    bits = layout.ROUND | (layout.OPEN if emissive or not caps else 0)
-    assert arrays.boxes["shape"].tolist() == [bits | 1, bits | layout.HIDDEN | 2]
+    bits = ShapeBit.ROUND | (ShapeBit.OPEN if emissive or not caps else 0)
+    assert arrays.boxes["shape"].tolist() == [bits | 1, bits | ShapeBit.HIDDEN | 2]
     matrix = np.eye(4) if transform is None else matrix_of(transform)
     axes = np.linalg.inv(np.stack([arrays.boxes[f"row_{name}"][0].astype(float) for name in "xyz"]))
     center = arrays.boxes["center"][0]
@@ -60,7 +60,7 @@ def test_cylinder_is_the_round_in_a_box(transform, emissive, caps):
     quads = arrays.quads[(arrays.quads["shape"] & 3) == 1]
     assert len(quads) == (2 if emissive and caps else 0)
     for quad_, way in zip(quads, (1, -1), strict=False):
-        assert quad_["shape"] & layout.ROUND
+        assert quad_["shape"] & ShapeBit.ROUND
         middle = quad_["origin"] + (quad_["u"] + quad_["v"]) / 2
         np.testing.assert_allclose(middle, center + way * axes[:, 1], rtol=1e-5, atol=1e-5)
         outward = way * np.linalg.inv(matrix[:3, :3]).T @ [2, 3, 6]
