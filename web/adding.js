@@ -1,6 +1,7 @@
 // Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
 
-import { box, isFlat, remember } from "./document/bounds.js";
+import { box, remember } from "./document/bounds.js";
+import { isFlat } from "./document/kinds.js";
 import { axes, halfHeight, isInSight } from "./document/camera.js";
 import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
@@ -10,7 +11,7 @@ import { LIGHTS } from "./document/lights.js";
 import { isLamp } from "./document/emission.js";
 import { ballOf, floors, lookedAt, middle, sized, solids, standing, union, wayOut } from "./document/placing.js";
 import { KINDS } from "./document/shapes.js";
-import { moved } from "./document/transforms.js";
+import { moved } from "./document/moving.js";
 import { add, normalize, scale, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
@@ -41,13 +42,14 @@ export class Adder {
   }
 
   // One of `additions`.
-  async add({ kind, title, make, shines, carries }) {
+  async add({ title, type, shines, carries }) {
     const { acts } = this;
     if (carries) return this.stage("ground");
-    if (shines) return this.#addLight(title, shines);
+    if (shines) return this.#addLight(title, type);
     const { materials } = acts.state.scene;
     const material = fresh(title, materials);
-    const made = make(acts.camera, this.controller.radius(), material);
+    const center = acts.camera.target.map((x) => Number(x.toFixed(3)));
+    const made = KINDS[type].make(center, this.controller.radius(), material);
     const around = await this.#surroundings();
     return this.#put([made], { materials: { [material]: acts.plainMaterial }, around, stands: !isFlat(made) });
   }

@@ -1,6 +1,6 @@
 // Models that move: they come in at rest, and stand in another pose when somebody asks for it in the inspector.
 
-import { moved } from "./document/transforms.js";
+import { moved } from "./document/moving.js";
 import { equal, pointer } from "./lib/patch.js";
 import { fetchPosedScene } from "./server/api.js";
 

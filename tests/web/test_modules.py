@@ -254,7 +254,7 @@ def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
     ],
 )
 def test_shapes_are_moved(page: Page, shape: dict[str, Any], expected: dict[str, Any]) -> None:
-    assert call(page, "document/transforms.js", "moved", shape, [1, 0, -2]) == shape | expected
+    assert call(page, "document/moving.js", "moved", shape, [1, 0, -2]) == shape | expected
 
 
 NUMBERS = {

@@ -34,9 +34,6 @@ export function see({ asset, transform }, cloud) {
   seen.set(asset, corners(low, high));
 }
 
-// What is flat by its kind: a floor, a wall, a panel.
-export const isFlat = ({ type }) => Boolean(KINDS[type]?.isFlat);
-
 // Points of a shape before its transform, or null where neither the document nor its file tells.
 const points = (shape) => KINDS[shape.type].points?.(shape) ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
 

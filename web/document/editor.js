@@ -5,7 +5,7 @@ import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
 import { exposed } from "./lighting.js";
-import { isFlat } from "./bounds.js";
+import { isFlat } from "./kinds.js";
 import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { isShape, selectedWith, users, wearing } from "./materials.js";
 import { filesFor, modelOfFile } from "./model-files.js";

@@ -1,6 +1,6 @@
 // What emits light, and how much.
 
-import { KINDS } from "./shapes.js";
+import { SHAPES } from "./kinds.js";
 import { linear } from "../lib/color.js";
 import { at, isObject } from "../lib/patch.js";
 
@@ -22,5 +22,5 @@ export const isLamp = ({ materials }, { material }) => Math.max(...emissionOf(ma
 export function isSet(scene, thing) {
   if (thing.startsWith("/lights/")) return true;
   const shape = thing.startsWith("/shapes/") ? at(scene, thing) : null;
-  return Boolean(shape) && Boolean(KINDS[shape.type].lamp) && isLamp(scene, shape);
+  return Boolean(shape) && Boolean(SHAPES[shape.type]?.lamp) && isLamp(scene, shape);
 }

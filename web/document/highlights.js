@@ -1,7 +1,7 @@
 // Where a light has to stand for its reflection to lie at a point of the picture.
 
 import { positionOf, swung } from "./lamps.js";
-import { isLight } from "./lights.js";
+import { isLight } from "./kinds.js";
 import { shifted, wrapped } from "./manipulation.js";
 import { add, dot, length, normalize, scale, subtract } from "../lib/vector.js";
 

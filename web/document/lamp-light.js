@@ -3,14 +3,15 @@
 
 import { NITS, emissionOf } from "./emission.js";
 import { farther, positionOf, targetOf } from "./lamps.js";
-import { LIGHTS, isLight } from "./lights.js";
+import { isFlat, isLight } from "./kinds.js";
+import { LIGHTS } from "./lights.js";
 import { growing, mapped, stretching } from "./manipulation.js";
 import { users } from "./materials.js";
 import { place } from "./placement.js";
 import { KINDS } from "./shapes.js";
 import { linear } from "../lib/color.js";
 import { at, put } from "../lib/patch.js";
-import { add, length, normalize, scale, subtract, tidy } from "../lib/vector.js";
+import { length, normalize, scale, subtract } from "../lib/vector.js";
 
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const FEWEST = 1e-4; // m: no lamp is smaller
@@ -127,8 +128,8 @@ export const softnessWords = (value) => (value < 0.15 ? "hard" : value < 0.5 ? "
 // What its strength is for each unit that a lamp's box has: {unit: factor}, of a strength's luminance in its own unit.
 export function photometry(scene, document) {
   if (isLight(document)) return scaled(LIGHTS[document.type].units(document));
-  const { isFlat, lamp } = KINDS[document.type];
-  const sides = isFlat && scene.materials[document.material].emission_sides === "both" ? 2 : 1;
+  const { lamp } = KINDS[document.type];
+  const sides = isFlat(document) && scene.materials[document.material].emission_sides === "both" ? 2 : 1;
   return scaled({ lm: Math.PI * lamp.surface(spans(document)) * sides, nt: 1 });
 }
 

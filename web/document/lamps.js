@@ -1,15 +1,15 @@
 // Lights as a photographer places them: aimed at a subject, from a side where none is yet.
 
-import { isFlat, ownBox } from "./bounds.js";
+import { ownBox } from "./bounds.js";
 import { axes } from "./camera.js";
 import { isLamp } from "./emission.js";
-import { isLight } from "./lights.js";
+import { isFlat, isLight } from "./kinds.js";
 import { mapped, shifted } from "./manipulation.js";
 import { place } from "./placement.js";
 import { ballOf, middle, union } from "./placing.js";
 import { KINDS } from "./shapes.js";
 import { hit } from "./through.js";
-import { add, cross, dot, length, normalize, scale, subtract, tidy, turn } from "../lib/vector.js";
+import { add, cross, dot, length, normalize, scale, subtract, turn } from "../lib/vector.js";
 
 // Where lamps stand about a subject, in degrees to the right of the camera and above the ground: a key light, a fill
 // light, two that shine from behind, one from above.

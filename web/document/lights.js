@@ -1,5 +1,4 @@
 // A row for each kind of light that is no shape:
-//   title               as it is offered
 //   make(stand)         a new one: {position, direction, radius, distance, power}: how wide what it is aimed at is, and
 //                       how far away; power(factor) is the strength that is needed there, times a factor
 //   strength            the name of the field that holds it
@@ -20,14 +19,12 @@ function beam({ inner_angle: inner, outer_angle: outer }) {
 
 export const LIGHTS = {
   point: {
-    title: "Point light",
     make: ({ position, distance, power }) => ({ type: "point", position, intensity: power(distance * distance) }),
     strength: "intensity",
     units: () => ({ lm: 4 * Math.PI, cd: 1 }),
     isSharp: true,
   },
   spot: {
-    title: "Spot light",
     make: ({ position, direction, radius, distance, power }) => ({
       type: "spot",
       position,
@@ -40,11 +37,8 @@ export const LIGHTS = {
     isSharp: true,
   },
   directional: {
-    title: "Sun",
     make: ({ direction, power }) => ({ type: "directional", direction, irradiance: power(1), angular_diameter: 0.53 }),
     strength: "irradiance",
     units: () => ({ lx: 1 }),
   },
 };
-
-export const isLight = ({ type }) => Object.hasOwn(LIGHTS, type);

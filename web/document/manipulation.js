@@ -1,9 +1,10 @@
 // A thing of the scene moved, turned or scaled as a whole: a shape or a light, by a linear map about a pivot.
 
-import { isLight } from "./lights.js";
+import { isLight } from "./kinds.js";
 import { place } from "./placement.js";
 import { KINDS } from "./shapes.js";
-import { moved, parts } from "./transforms.js";
+import { moved } from "./moving.js";
+import { parts } from "./transforms.js";
 import { add, cross, dot, length, scale, subtract, tidy, turn } from "../lib/vector.js";
 
 const WORLD = [

@@ -1,4 +1,4 @@
-// What a shape's transform does to places.
+// Where a shape's transform takes places.
 
 import { add, cross, dot, subtract } from "../lib/vector.js";
 

@@ -1,6 +1,5 @@
-// A row for each kind of shape, in the order in which they are offered. All functions but `touches` are of the shape
-// before its transform:
-//   title, make(center, r, material)  as it is offered, and a new one of about that radius
+// A row for each kind of shape: its geometry, before its transform.
+//   make(center, r, material)  a new one of about that radius
 //   points(shape)       some whose box is its own; null: not known
 //   touches(shape)      those where its box in the scene touches it, if that is not the box of its points
 //   hit(shape, from, way)  how far along a ray it is met, or null
@@ -10,8 +9,8 @@
 //                       one that does nothing but that, else null. Without it, or with null, the transform changes
 //   axes(shape)         along which it can be stretched; the world's, if it has none
 //   rings(shape)        the polygons between which it lies; of a ball (`isBall`) there are none
-//   isFlat, normal(shape)  it is a sheet, with a front; lamps stay before one that `isWall`
-//   lamp                of what can be a lamp: {title, word, make({position, toLight}, side, material), spans(shape, way),
+//   normal(shape)       of a flat one: where its front faces; lamps stay before one that `isWall`
+//   lamp                of what can be a lamp: {make({position, toLight}, side, material), spans(shape, way),
 //                       facing(spans), surface(spans), resized(shape, name, factor, spans, center)}: a new one that shines
 //                       at the subject, as large as a square with that side; its edges or its axis and radius in the
 //                       scene; the area that is seen from its front, and all of one side, m²; with another measure
@@ -41,7 +40,6 @@ function sphereTouches({ center, radius, transform }) {
 }
 
 const sphere = {
-  title: "Sphere",
   make: (center, r, material) => ({ type: "sphere", center, radius: r, material }),
   isBall: true,
   touches: sphereTouches,
@@ -56,7 +54,6 @@ const sphere = {
       ? { ...shape, center: to(shape.center), radius: sevenDigits(shape.radius * factors[0]) }
       : null,
   lamp: {
-    title: "Sphere light",
     make({ position }, side, material) {
       const radius = Number((side / 3).toPrecision(3));
       return { type: "sphere", center: position, radius, material };
@@ -68,7 +65,6 @@ const sphere = {
 };
 
 const box = {
-  title: "Box",
   make: (center, r, material) => ({
     type: "box",
     min: center.map((x) => x - r),
@@ -91,7 +87,6 @@ const box = {
 const quadCorners = ({ origin, u, v }) => [origin, add(origin, u), add(add(origin, u), v), add(origin, v)];
 
 const quad = {
-  title: "Quad",
   make: (center, r, material) => ({
     type: "quad",
     origin: center.map((x, i) => x + [-r, 0, r][i]),
@@ -99,7 +94,6 @@ const quad = {
     v: [0, 0, -2 * r],
     material,
   }),
-  isFlat: true,
   isWall: true, // lamps stay before it
   normal: ({ u, v }) => cross(u, v),
   points: quadCorners,
@@ -120,8 +114,6 @@ const quad = {
   axes: ({ u, v }) => [u, v, cross(u, v)],
   rings: (shape) => [quadCorners(shape)],
   lamp: {
-    title: "Area light",
-    word: "area",
     make({ position, toLight }, side, material) {
       const flat = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
       const u = scale(flat, side);
@@ -144,9 +136,7 @@ const quad = {
 const diskRim = ({ normal, center, radius }) => rimAbout(normal, center, radius);
 
 const disk = {
-  title: "Disk",
   make: (center, r, material) => ({ type: "disk", center, normal: [0, 1, 0], radius: r, material }),
-  isFlat: true,
   normal: ({ normal }) => normal,
   points: diskRim,
   hit: ({ center, normal, radius }, from, way) => planeHit(center, normal, from, way, (p) => length(p) <= radius),
@@ -159,7 +149,6 @@ const disk = {
   axes: ({ normal }) => axesAbout(normal),
   rings: (shape) => [diskRim(shape)],
   lamp: {
-    title: "Disk light",
     make({ position, toLight }, side, material) {
       const radius = Number((side / Math.sqrt(Math.PI)).toPrecision(3)); // as large as the rectangle
       const normal = toLight.map((x) => Number((-x).toPrecision(4)) + 0);
@@ -174,7 +163,6 @@ const disk = {
 const cylinderRims = ({ base, axis, radius }) => [base, add(base, axis)].map((center) => rimAbout(axis, center, radius));
 
 const cylinder = {
-  title: "Cylinder",
   make: ([x, y, z], r, material) => ({
     type: "cylinder",
     base: [x, y - r, z],
@@ -204,7 +192,6 @@ const cylinder = {
   axes: ({ axis }) => axesAbout(axis),
   rings: cylinderRims,
   lamp: {
-    title: "Tube light",
     // A tube that lies across the way to the subject: as long as two rectangles, and a sixteenth as thick.
     make({ position, toLight }, side, material) {
       const level = Math.abs(toLight[1]) > 0.999 ? [1, 0, 0] : normalize(cross([0, 1, 0], toLight));
@@ -237,4 +224,3 @@ const mesh = {
 };
 
 export const KINDS = { sphere, box, quad, disk, cylinder, mesh };
-export const LAMPS = ["quad", "disk", "cylinder", "sphere"]; // in the order in which they are offered

@@ -1,7 +1,7 @@
 // What things stand on, of the editor's own: a wide ground, or a cyclorama, a floor that rises to a wall without an edge.
 
 import { fetchPreset } from "../server/api.js";
-import { isFlat } from "./bounds.js";
+import { isFlat } from "./kinds.js";
 import { fresh, users } from "./materials.js";
 import { without } from "./outline.js";
 import { ballOf, union } from "./placing.js";

@@ -1,7 +1,7 @@
 // What a scene consists of, in the order in which a list shows it.
 
 import { isLamp } from "./emission.js";
-import { KINDS } from "./shapes.js";
+import { SHAPES } from "./kinds.js";
 import { inWords } from "../lib/format-text.js";
 import { pointer } from "../lib/patch.js";
 
@@ -31,7 +31,7 @@ export function things(scene) {
       note: "",
     })),
     ...shapes.map((shape, i) => {
-      const kind = isLamp(scene, shape) ? `${KINDS[shape.type].lamp?.word ?? shape.type} light` : shape.type;
+      const kind = isLamp(scene, shape) ? `${SHAPES[shape.type]?.word ?? shape.type} light` : shape.type;
       const told = own(shape.name) || title(kind);
       return {
         thing: pointer("shapes", i),

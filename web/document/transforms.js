@@ -1,7 +1,6 @@
 // Where a shape stands: a matrix as the move, turn and scale that a person edits, and shapes that are moved.
 
-import { KINDS } from "./shapes.js";
-import { add, cross, dot, length, scale, tidy } from "../lib/vector.js";
+import { cross, dot, length, scale, tidy } from "../lib/vector.js";
 
 // The cosine between two axes up to which they count as perpendicular: files hold single precision, and a part's
 // matrix is the product of its parents'.
@@ -44,24 +43,11 @@ export function shown(transform = {}) {
   return parts(matrix) ?? { translate: [matrix[3], matrix[7], matrix[11]] };
 }
 
-const translated = (matrix, [x, y, z]) => matrix.with(3, x).with(7, y).with(11, z);
+export const translated = (matrix, [x, y, z]) => matrix.with(3, x).with(7, y).with(11, z);
 
 // The transform with another move, turn or scale; undefined goes back to none.
 export function changed(transform, name, value) {
   if (isSkewed(transform)) return { matrix: translated(transform.matrix, value ?? [0, 0, 0]) };
   const { [name]: _, ...rest } = shown(transform);
   return value === undefined ? rest : { ...rest, [name]: value };
-}
-
-// A shape in another place, by an offset in metres.
-export function moved(shape, offset) {
-  const by = (point) => tidy(add(point, offset));
-  const { matrix } = shape.transform ?? {};
-  if (matrix) return { ...shape, transform: { matrix: translated(matrix, by([matrix[3], matrix[7], matrix[11]])) } };
-  const kind = KINDS[shape.type];
-  if (shape.transform || !kind.moved) {
-    const { translate = [0, 0, 0] } = shape.transform ?? {};
-    return { ...shape, transform: { ...shape.transform, translate: by(translate) } };
-  }
-  return kind.moved(shape, by);
 }

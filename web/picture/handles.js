@@ -5,7 +5,7 @@ import { isOn } from "../document/outline.js";
 import { ownBox, see } from "../document/bounds.js";
 import { axes } from "../document/camera.js";
 import { groundUnder } from "../document/ground.js";
-import { isLight } from "../document/lights.js";
+import { isLight } from "../document/kinds.js";
 import { growing, mapped, ownAxes, shifted, stretching, turning, wrapped } from "../document/manipulation.js";
 import { middle, union } from "../document/placing.js";
 import { HANDLED } from "../document/ui-state.js";

@@ -1,6 +1,7 @@
 // What a click in the picture is about, and what the camera is brought to: selecting, focusing, framing.
 
-import { ball, box, isFlat, learn, together } from "../document/bounds.js";
+import { ball, box, learn, together } from "../document/bounds.js";
+import { isFlat } from "../document/kinds.js";
 import { axes, eye, ray } from "../document/camera.js";
 import { isOn } from "../document/outline.js";
 import { Picker, isThere } from "../document/picking.js";
