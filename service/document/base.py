@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import islice
 from types import NoneType
 from typing import Annotated, Any, Literal, get_args
@@ -56,8 +57,8 @@ FOLLOWED = [round((1 - math.cos(math.pi * i / 64)) / 2, 9) for i in range(65)]
 def hint(
     title: str,
     description: str,
-    *,
     group: Group | None = None,
+    *,
     unit: str | None = None,
     widget: str | None = None,
     soft: tuple[float, float] | float | None = None,
@@ -131,6 +132,12 @@ def hint(
     if log is not None:
         extra["x-log"] = log
     return Field(title=title, description=description, json_schema_extra=extra)
+
+
+slider = partial(hint, widget="slider", unit="")
+picker = partial(hint, widget="color", unit="")
+entry = partial(hint, widget="number", unit="m")  # a box for a number, or for several
+dial = partial(hint, widget="angle", unit="degrees")
 
 
 def field_names(model: type[BaseModel]) -> list[str]:

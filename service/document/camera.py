@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from service.document.base import OMITTABLE, Model, hint, refusal
+from service.document.base import OMITTABLE, Model, entry, refusal, slider
 from service.document.numbers import Direction, Length, Point, PositiveLength
 
 # Below this sine of the angle between up and the view the rounding of float64 coordinates of 1e9 decides what is up.
@@ -18,12 +18,9 @@ LEAST_SINE = 1e-7
 class AnyCamera(Model):
     """Looks from `position` to `target`."""
 
-    position: Annotated[Point, hint("Position", "Where the camera stands.", unit="m", widget="number")]
-    target: Annotated[Point, hint("Target", "The point in the middle of the picture.", unit="m", widget="number")]
-    up: Annotated[
-        Direction,
-        hint("Up", "The direction that is upward in the picture.", unit="", widget="number"),
-    ] = (0.0, 1.0, 0.0)
+    position: Annotated[Point, entry("Position", "Where the camera stands.")]
+    target: Annotated[Point, entry("Target", "The point in the middle of the picture.")]
+    up: Annotated[Direction, entry("Up", "The direction that is upward in the picture.", unit="")] = (0.0, 1.0, 0.0)
 
     @model_validator(mode="after")
     def _spans_a_view(self) -> Self:
@@ -44,34 +41,21 @@ class PerspectiveCamera(AnyCamera):
     vfov: Annotated[
         float,
         Field(gt=0, lt=180),
-        hint(
+        slider(
             "Field of view",
             "How much the picture takes in from top to bottom: 40 is a short telephoto, 75 a wide angle.",
             unit="degrees",
-            widget="slider",
             soft=(5, 120),
         ),
     ] = 40.0
     aperture_radius: Annotated[
         Length,
-        hint(
-            "Aperture radius",
-            "0 is sharp everywhere. Larger blurs what is out of focus.",
-            unit="m",
-            widget="slider",
-            soft=0.2,
-        ),
+        slider("Aperture radius", "0 is sharp everywhere. Larger blurs what is out of focus.", unit="m", soft=0.2),
     ] = 0.0
     focus_distance: Annotated[
         PositiveLength | None,
         OMITTABLE,
-        hint(
-            "Focus distance",
-            "How far away things are sharp. Without it, at the target.",
-            unit="m",
-            widget="slider",
-            soft=20,
-        ),
+        slider("Focus distance", "How far away things are sharp. Without it, at the target.", unit="m", soft=20),
     ] = None
 
 
@@ -80,8 +64,7 @@ class OrthographicCamera(AnyCamera):
 
     type: Literal["orthographic"]
     height: Annotated[
-        PositiveLength,
-        hint("Height", "What the picture shows from bottom to top.", unit="m", widget="slider", soft=10),
+        PositiveLength, slider("Height", "What the picture shows from bottom to top.", unit="m", soft=10)
     ]
 
 

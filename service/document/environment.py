@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from service.document.base import OMITTABLE, Model, hint, refusal
+from service.document.base import OMITTABLE, Model, dial, hint, picker, refusal, slider
 from service.document.medium import Medium
 from service.document.numbers import BRIGHTEST, Degrees, Factor, Fraction
 from service.document.photometry import Radiance
@@ -15,23 +15,14 @@ from service.document.photometry import Radiance
 class _Surroundings(Model):
     rotation: Annotated[
         Degrees,
-        hint(
+        dial(
             "Rotation",
             "Turns the surroundings about the vertical, counter-clockwise seen from above.",
-            unit="degrees",
-            widget="angle",
             soft=(-180, 180),
         ),
     ] = 0.0
     scale: Annotated[
-        Factor,
-        hint(
-            "Brightness",
-            "How bright the surroundings are. Twice as much is one stop.",
-            unit="",
-            widget="slider",
-            soft=4,
-        ),
+        Factor, slider("Brightness", "How bright the surroundings are. Twice as much is one stop.", soft=4)
     ] = 1.0
     background: Annotated[
         bool,
@@ -63,12 +54,8 @@ class ConstantEnvironment(_Surroundings):
     type: Literal["constant"]
     radiance: Annotated[
         Radiance,
-        hint(
-            "Radiance",
-            "How bright it is in every direction, as under an overcast sky.",
-            unit="W/(m^2 sr)",
-            widget="color",
-            soft=4,
+        picker(
+            "Radiance", "How bright it is in every direction, as under an overcast sky.", unit="W/(m^2 sr)", soft=4
         ),
     ]
 
@@ -83,11 +70,10 @@ class _Picture(_Surroundings):
     blur: Annotated[
         float,
         Field(ge=0, le=90),
-        hint(
+        slider(
             "Blur",
             "Blurs the surroundings: less noise and softer shadows, but less true to the image.",
             unit="degrees",
-            widget="slider",
             soft=30,
         ),
     ] = 0.0
@@ -97,11 +83,7 @@ class ImageEnvironment(_Picture):
     """A latitude-longitude image; -Z is in its middle."""
 
     type: Literal["image"]
-    asset: Annotated[
-        str,
-        Field(min_length=1),
-        hint("Image", "A panorama of all directions, as an EXR or HDR file."),
-    ]
+    asset: Annotated[str, Field(min_length=1), hint("Image", "A panorama of all directions, as an EXR or HDR file.")]
 
 
 class CubeFaces(Model):
@@ -127,38 +109,16 @@ class SkyEnvironment(_Surroundings):
 
     type: Literal["sky"]
     sun_elevation: Annotated[
-        float,
-        Field(ge=0, le=90),
-        hint("Sun elevation", "Height of the sun: 0 is at the horizon, 90 overhead.", unit="degrees", widget="angle"),
+        float, Field(ge=0, le=90), dial("Sun elevation", "Height of the sun: 0 is at the horizon, 90 overhead.")
     ]
-    sun_azimuth: Annotated[
-        Degrees,
-        hint(
-            "Sun azimuth",
-            "Where the sun stands: 0 is -Z, 90 is +X.",
-            unit="degrees",
-            widget="angle",
-            soft=(-180, 180),
-        ),
-    ]
+    sun_azimuth: Annotated[Degrees, dial("Sun azimuth", "Where the sun stands: 0 is -Z, 90 is +X.", soft=(-180, 180))]
     turbidity: Annotated[
         float,
         Field(ge=1, le=10),
-        hint(
-            "Turbidity",
-            "How hazy the air is: 1 is pure air, 3 a clear day, 6 hazy, 10 murky.",
-            unit="",
-            widget="slider",
-        ),
+        slider("Turbidity", "How hazy the air is: 1 is pure air, 3 a clear day, 6 hazy, 10 murky."),
     ] = 3.0
     ground_albedo: Annotated[
-        Fraction,
-        hint(
-            "Ground albedo",
-            "How bright the ground is: 0.3 is soil and grass.",
-            unit="",
-            widget="slider",
-        ),
+        Fraction, slider("Ground albedo", "How bright the ground is: 0.3 is soil and grass.")
     ] = 0.3
     sun: Annotated[bool, hint("Sun", "Off: the sky alone, as if the sun were hidden.")] = True
 

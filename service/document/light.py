@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
-from service.document.base import Name, Named, hint, refusal
+from service.document.base import Name, Named, dial, entry, picker, refusal
 from service.document.color import Color
 from service.document.numbers import Direction, Point
 from service.document.photometry import SPHERE, Flux, strength, strength_schema
@@ -25,16 +25,10 @@ class PointLight(_Light):
     """Shines equally in all directions, with 1/d^2; its shadows are sharp."""
 
     type: Literal["point"]
-    position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
+    position: Annotated[Point, entry("Position", "Where the light stands.")]
     intensity: Annotated[
         Intensity,
-        hint(
-            "Intensity",
-            "How bright it is: the light that falls on a surface 1 m away.",
-            unit="W/sr",
-            widget="color",
-            soft=100,
-        ),
+        picker("Intensity", "How bright it is: the light that falls on a surface 1 m away.", unit="W/sr", soft=100),
     ]
 
     @model_validator(mode="after")
@@ -48,36 +42,25 @@ class SpotLight(_Light):
     """A point that shines into a cone: full inside the inner angle, fading to nothing at the outer."""
 
     type: Literal["spot"]
-    position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
-    direction: Annotated[
-        Direction, hint("Direction", "The direction in which the beam points.", unit="", widget="number")
-    ]
+    position: Annotated[Point, entry("Position", "Where the light stands.")]
+    direction: Annotated[Direction, entry("Direction", "The direction in which the beam points.", unit="")]
     intensity: Annotated[
         Intensity,
-        hint(
+        picker(
             "Intensity",
             "How bright it is: the light that falls on a surface 1 m away, in the middle of the beam.",
             unit="W/sr",
-            widget="color",
             soft=100,
         ),
     ]
     inner_angle: Annotated[
-        HalfAngle,
-        hint(
-            "Inner angle",
-            "From the middle of the beam to where the light begins to fade.",
-            unit="degrees",
-            widget="angle",
-        ),
+        HalfAngle, dial("Inner angle", "From the middle of the beam to where the light begins to fade.")
     ]
     outer_angle: Annotated[
         HalfAngle,
-        hint(
+        dial(
             "Outer angle",
             "From the middle of the beam to where nothing is left. The same as the inner angle gives a sharp edge.",
-            unit="degrees",
-            widget="angle",
         ),
     ]
 
@@ -100,27 +83,22 @@ class DirectionalLight(_Light):
     """Light from infinity, such as the sun's: parallel, or from a disk in the sky where it has a diameter."""
 
     type: Literal["directional"]
-    direction: Annotated[
-        Direction, hint("Direction", "The direction in which the light travels.", unit="", widget="number")
-    ]
+    direction: Annotated[Direction, entry("Direction", "The direction in which the light travels.", unit="")]
     irradiance: Annotated[
         Irradiance,
-        hint(
+        picker(
             "Irradiance",
             "How bright the light is on a surface that faces it. The sun at noon gives about 1000.",
             unit="W/m^2",
-            widget="color",
             soft=10,
         ),
     ]
     angular_diameter: Annotated[
         float,
         Field(ge=0, le=90),
-        hint(
+        dial(
             "Angular diameter",
             "How large the light looks: 0 gives sharp shadows, 0.53 is the sun, more is softer. Brightness stays.",
-            unit="degrees",
-            widget="angle",
             soft=10,
         ),
     ] = 0.0

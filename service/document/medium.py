@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
 
-from service.document.base import OMITTABLE, Model, hint, refusal
+from service.document.base import OMITTABLE, Model, picker, refusal, slider
 from service.document.color import Color, Reflectance, color, color_schema
 from service.document.numbers import LARGEST
 from service.document.photometry import Radiance
@@ -21,45 +21,28 @@ class Medium(Model):
 
     absorption: Annotated[
         Coefficient,
-        hint(
-            "Absorption",
-            "The rate at which light is lost, per channel.",
-            unit="1/m",
-            widget="color",
-            soft=1000,
-            log=0.01,
-        ),
+        picker("Absorption", "The rate at which light is lost, per channel.", unit="1/m", soft=1000, log=0.01),
     ] = (0.0, 0.0, 0.0)
     scattering: Annotated[
         Coefficient,
-        hint(
-            "Scattering",
-            "The rate at which light turns, per channel.",
-            unit="1/m",
-            widget="color",
-            soft=1000,
-            log=0.01,
-        ),
+        picker("Scattering", "The rate at which light turns, per channel.", unit="1/m", soft=1000, log=0.01),
     ] = (0.0, 0.0, 0.0)
     albedo: Annotated[
         Reflectance | None,
         OMITTABLE,
-        hint(
+        picker(
             "Albedo",
             "The colour that much of it has. With a radius it replaces absorption and scattering.",
-            unit="",
-            widget="color",
             absent="from absorption and scattering",
         ),
     ] = None
     radius: Annotated[
         Coefficient | None,
         OMITTABLE,
-        hint(
+        picker(
             "Radius",
             "How far light goes, on average, before something happens to it, per channel.",
             unit="m",
-            widget="color",
             soft=1,
             log=1e-5,
             absent="from absorption and scattering",
@@ -68,23 +51,12 @@ class Medium(Model):
     g: Annotated[
         float,
         Field(gt=-1, lt=1),
-        hint(
-            "Direction",
-            "Where light goes when it is scattered: above 0 onwards, below 0 back.",
-            unit="",
-            widget="slider",
-            soft=(-0.95, 0.95),
+        slider(
+            "Direction", "Where light goes when it is scattered: above 0 onwards, below 0 back.", soft=(-0.95, 0.95)
         ),
     ] = 0.0
     emission: Annotated[
-        Radiance,
-        hint(
-            "Emission",
-            "The light that it gives off itself, for each metre.",
-            unit="W/(m^3 sr)",
-            widget="color",
-            soft=4,
-        ),
+        Radiance, picker("Emission", "The light that it gives off itself, for each metre.", unit="W/(m^3 sr)", soft=4)
     ] = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")

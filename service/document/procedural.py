@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from service.document.base import Model, hint
+from service.document.base import Model, entry, hint, picker, slider
 from service.document.color import Radiometric
 from service.document.numbers import Coordinate, Fraction, Point
 
@@ -26,56 +26,49 @@ class NoiseTexture(Model):
     """
 
     type: Literal["noise"]
-    a: Annotated[
-        Radiometric, hint("First", "The colour or value where the noise is lowest.", unit="", widget="color", soft=1)
-    ] = (0.0, 0.0, 0.0)
-    b: Annotated[
-        Radiometric, hint("Second", "The colour or value where it is highest.", unit="", widget="color", soft=1)
-    ] = (1.0, 1.0, 1.0)
+    a: Annotated[Radiometric, picker("First", "The colour or value where the noise is lowest.", soft=1)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    b: Annotated[Radiometric, picker("Second", "The colour or value where it is highest.", soft=1)] = (1.0, 1.0, 1.0)
     space: Annotated[
         Literal["object", "uv"],
         hint("Space", "object: solid, as in marble or wood; uv: on the surface, along its texture coordinates."),
     ] = "object"
     scale: Annotated[
-        Point, hint("Scale", "Cells of the first octave a metre along x, y and z, or along u and v; unequal numbers "
-                             "stretch the pattern.", unit="", widget="number")
-    ] = (4.0, 4.0, 4.0)  # fmt: skip
-    offset: Annotated[Point, hint("Offset", "Moves the pattern, in cells.", unit="", widget="number")] = (
+        Point,
+        entry(
+            "Scale",
+            "Cells of the first octave a metre along x, y and z, or along u and v; unequal numbers "
+            "stretch the pattern.",
+            unit="",
+        ),
+    ] = (4.0, 4.0, 4.0)
+    offset: Annotated[Point, entry("Offset", "Moves the pattern, in cells.", unit="")] = (
         0.0, 0.0, 0.0,
     )  # fmt: skip
     octaves: Annotated[
-        int,
-        Field(ge=1, le=10),
-        hint("Octaves", "How many layers of finer detail there are. Each costs time.", unit="", widget="slider"),
+        int, Field(ge=1, le=10), slider("Octaves", "How many layers of finer detail there are. Each costs time.")
     ] = 4
     lacunarity: Annotated[
-        float, Field(ge=1, le=4),
-        hint("Lacunarity", "How much finer each layer is than the one before.", unit="", widget="slider"),
-    ] = 2.0  # fmt: skip
-    gain: Annotated[
-        Fraction, hint("Gain", "How strong each finer layer is: the roughness of the detail.",
-                       unit="", widget="slider")
-    ] = 0.5  # fmt: skip
+        float, Field(ge=1, le=4), slider("Lacunarity", "How much finer each layer is than the one before.")
+    ] = 2.0
+    gain: Annotated[Fraction, slider("Gain", "How strong each finer layer is: the roughness of the detail.")] = 0.5
     turbulence: Annotated[bool, hint("Turbulence", "On: with creases, as in marble.")] = False
     contrast: Annotated[
-        float, Field(ge=0, le=1000),
-        hint("Contrast", "How far the two colours stand apart.",
-             unit="", widget="slider", soft=8),
-    ] = 2.0  # fmt: skip
+        float, Field(ge=0, le=1000), slider("Contrast", "How far the two colours stand apart.", soft=8)
+    ] = 2.0
     seed: Annotated[
-        int,
-        Field(ge=0, le=LARGEST_SEED),
-        hint("Seed", "Another number gives another pattern.", unit="", widget="number"),
+        int, Field(ge=0, le=LARGEST_SEED), entry("Seed", "Another number gives another pattern.", unit="")
     ] = 0
 
 
 class RampStop(Model):
     """A colour, and where the ramp has it."""
 
-    position: Annotated[
-        Fraction, hint("Position", "Where on the ramp it lies, from 0 to 1.", unit="", widget="slider")
-    ]
-    color: Annotated[Radiometric, hint("Colour", "The colour or value there.", unit="", widget="color", soft=1)]
+    position: Annotated[Fraction, slider("Position", "Where on the ramp it lies, from 0 to 1.")]
+    color: Annotated[Radiometric, picker("Colour", "The colour or value there.", soft=1)]
 
 
 class RampInput(Model):
@@ -116,10 +109,10 @@ class RampTexture(Model):
         Literal["linear", "constant", "smooth"], hint("Interpolation", "How a colour becomes the next one.")
     ] = "linear"
     scale: Annotated[
-        Coordinate, hint("Scale", "How often the ramp is run through: 2 runs through it twice, where it repeats.",
-                         unit="", widget="number")
-    ] = 1.0  # fmt: skip
-    offset: Annotated[Coordinate, hint("Offset", "Moves the colours along the ramp.", unit="", widget="number")] = 0.0
+        Coordinate,
+        entry("Scale", "How often the ramp is run through: 2 runs through it twice, where it repeats.", unit=""),
+    ] = 1.0
+    offset: Annotated[Coordinate, entry("Offset", "Moves the colours along the ramp.", unit="")] = 0.0
     wrap: Annotated[Literal["clamp", "repeat", "mirror"], hint("Wrap", "What lies beyond the ramp's ends.")] = "clamp"
 
     @property

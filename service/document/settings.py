@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Protocol
 from pydantic import Field, TypeAdapter
 
 from service.config import MAX_PIXELS
-from service.document.base import OMITTABLE, Model, hint
+from service.document.base import OMITTABLE, Model, entry, hint, slider
 from service.document.numbers import BRIGHTEST, LARGEST
 from service.document.validation import validated
 from service.problems import FieldError, InvalidDocument
@@ -29,17 +29,16 @@ class Limits(Protocol):
 class Settings(Model):
     """How to render. What is left out comes from the quality."""
 
-    width: Annotated[Size, hint("Width", "Of the picture.", unit="pixels", widget="number", soft=1920)] = 512
-    height: Annotated[Size, hint("Height", "Of the picture.", unit="pixels", widget="number", soft=1920)] = 512
+    width: Annotated[Size, entry("Width", "Of the picture.", unit="pixels", soft=1920)] = 512
+    height: Annotated[Size, entry("Height", "Of the picture.", unit="pixels", soft=1920)] = 512
     max_samples: Annotated[
         int | None,
         OMITTABLE,
         Field(ge=1, le=2**24),
-        hint(
+        entry(
             "Samples",
             "When to stop. Four times as many samples halve the noise.",
             unit="",
-            widget="number",
             soft=4096,
             default=BALANCED["max_samples"],
         ),
@@ -48,11 +47,9 @@ class Settings(Model):
         int | None,
         OMITTABLE,
         Field(ge=0, le=1024),
-        hint(
+        slider(
             "Bounces",
             "How often light may be reflected: 0 shows lamps only, 1 direct light, more the light between things.",
-            unit="",
-            widget="slider",
             soft=32,
             default=BALANCED["max_bounces"],
         ),
@@ -60,29 +57,27 @@ class Settings(Model):
     time_limit: Annotated[
         Amount | None,
         OMITTABLE,
-        hint(
+        entry(
             "Time limit",
             "Stops after this time. Without a number of samples, nothing else stops it.",
             unit="s",
-            widget="number",
             soft=60,
         ),
     ] = None
     target_noise: Annotated[
         Amount | None,
         OMITTABLE,
-        hint(
+        entry(
             "Target noise",
             "Stops when this little noise is left, as a share of the brightness: 0.01 looks clean.",
             unit="",
-            widget="number",
             soft=0.1,
         ),
     ] = None
     seed: Annotated[
         int,
         Field(ge=0, le=2**32 - 1),
-        hint("Seed", "Another number gives other noise, of the same strength.", unit="", widget="number", soft=100),
+        entry("Seed", "Another number gives other noise, of the same strength.", unit="", soft=100),
     ] = 0
     quality: Annotated[
         Literal["draft", "preview", "balanced", "high", "reference"],
@@ -104,11 +99,9 @@ class Settings(Model):
         int | None,
         OMITTABLE,
         Field(ge=0, le=1024),
-        hint(
+        slider(
             "Roulette from",
             "After how many bounces dim light may be given up: more speed for more noise.",
-            unit="",
-            widget="slider",
             soft=32,
             default=BALANCED["roulette_depth"],
         ),
@@ -117,26 +110,16 @@ class Settings(Model):
         float | None,
         OMITTABLE,
         Field(gt=0, le=1),
-        hint(
-            "Resolution",
-            "A factor on the width and the height.",
-            unit="",
-            widget="slider",
-            default=BALANCED["resolution_scale"],
-        ),
+        slider("Resolution", "A factor on the width and the height.", default=BALANCED["resolution_scale"]),
     ] = None
-    adaptive: Annotated[
-        bool,
-        hint("Adaptive", "More samples where there is more noise, fewer elsewhere."),
-    ] = False
+    adaptive: Annotated[bool, hint("Adaptive", "More samples where there is more noise, fewer elsewhere.")] = False
     clamp: Annotated[
         Annotated[float, Field(gt=0, le=BRIGHTEST)] | None,
         OMITTABLE,
-        hint(
+        entry(
             "Clamp",
             "Limits how bright reflected light can be: removes fireflies, and some light with them.",
             unit="W/(m^2 sr)",
-            widget="number",
             soft=100,
         ),
     ] = None
@@ -151,17 +134,9 @@ class Settings(Model):
     filter_glossy: Annotated[
         float,
         Field(ge=0, le=1),
-        hint(
-            "Filter glossy",
-            "Blurs reflections within reflections: less noise, but less true.",
-            unit="",
-            widget="slider",
-        ),
+        slider("Filter glossy", "Blurs reflections within reflections: less noise, but less true."),
     ] = 0.0
-    denoise: Annotated[
-        bool,
-        hint("Denoise", "Filters noise out of the picture."),
-    ] = False
+    denoise: Annotated[bool, hint("Denoise", "Filters noise out of the picture.")] = False
 
 
 _SETTINGS = TypeAdapter(Settings)

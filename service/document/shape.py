@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from service.document.base import OMITTABLE, Name, Named, hint, refusal
+from service.document.base import OMITTABLE, Name, Named, entry, hint, refusal, slider
 from service.document.medium import Medium
 from service.document.numbers import (
     Colors,
@@ -49,11 +49,10 @@ class _Body(_Placed):
     priority: Annotated[
         int,
         Field(ge=-100, le=100),
-        hint(
+        entry(
             "Priority",
             "Where glass, liquids and other clear bodies overlap, the one with the highest number is there.",
             unit="",
-            widget="number",
             soft=(-10, 10),
         ),
     ] = 0
@@ -66,21 +65,17 @@ class SphereShape(_Body):
     """An exact sphere, not a mesh."""
 
     type: Literal["sphere"]
-    center: Annotated[Point, hint("Centre", "The middle of the sphere.", unit="m", widget="number")]
-    radius: Annotated[
-        PositiveLength, hint("Radius", "From the centre to the surface.", unit="m", widget="slider", soft=5)
-    ]
+    center: Annotated[Point, entry("Centre", "The middle of the sphere.")]
+    radius: Annotated[PositiveLength, slider("Radius", "From the centre to the surface.", unit="m", soft=5)]
 
 
 class QuadShape(_Placed):
     """A parallelogram; its front is where u, v and the normal are right-handed."""
 
     type: Literal["quad"]
-    origin: Annotated[Point, hint("Corner", "The corner that both edges start from.", unit="m", widget="number")]
-    u: Annotated[Point, hint("Edge u", "From the corner along the first edge.", unit="m", widget="number")]
-    v: Annotated[
-        Point, hint("Edge v", "Along the second edge; the front faces cross(u, v).", unit="m", widget="number")
-    ]
+    origin: Annotated[Point, entry("Corner", "The corner that both edges start from.")]
+    u: Annotated[Point, entry("Edge u", "From the corner along the first edge.")]
+    v: Annotated[Point, entry("Edge v", "Along the second edge; the front faces cross(u, v).")]
 
     @model_validator(mode="after")
     def _has_area(self) -> Self:
@@ -95,24 +90,18 @@ class DiskShape(_Placed):
     """A flat disk; its front is where the normal points."""
 
     type: Literal["disk"]
-    center: Annotated[Point, hint("Centre", "The middle of the disk.", unit="m", widget="number")]
-    normal: Annotated[
-        Direction, hint("Normal", "The direction in which its front faces, and shines.", unit="", widget="number")
-    ]
-    radius: Annotated[
-        PositiveLength, hint("Radius", "From the centre to the rim.", unit="m", widget="slider", soft=5)
-    ]
+    center: Annotated[Point, entry("Centre", "The middle of the disk.")]
+    normal: Annotated[Direction, entry("Normal", "The direction in which its front faces, and shines.", unit="")]
+    radius: Annotated[PositiveLength, slider("Radius", "From the centre to the rim.", unit="m", soft=5)]
 
 
 class CylinderShape(_Body):
     """A cylinder between two flat caps, or an open tube."""
 
     type: Literal["cylinder"]
-    base: Annotated[Point, hint("Base", "The middle of the end where it begins.", unit="m", widget="number")]
-    axis: Annotated[Direction, hint("Axis", "From the base to the other end.", unit="m", widget="number")]
-    radius: Annotated[
-        PositiveLength, hint("Radius", "From the middle to the side.", unit="m", widget="slider", soft=5)
-    ]
+    base: Annotated[Point, entry("Base", "The middle of the end where it begins.")]
+    axis: Annotated[Direction, entry("Axis", "From the base to the other end.")]
+    radius: Annotated[PositiveLength, slider("Radius", "From the middle to the side.", unit="m", soft=5)]
     caps: Annotated[bool, hint("Caps", "Off: both ends are open, and you can see its inside.")] = True
 
 
@@ -120,8 +109,8 @@ class BoxShape(_Body):
     """A box along the axes; a transform turns it."""
 
     type: Literal["box"]
-    min: Annotated[Point, hint("Lower corner", "The corner with the smallest x, y and z.", unit="m", widget="number")]
-    max: Annotated[Point, hint("Upper corner", "The corner with the largest x, y and z.", unit="m", widget="number")]
+    min: Annotated[Point, entry("Lower corner", "The corner with the smallest x, y and z.")]
+    max: Annotated[Point, entry("Upper corner", "The corner with the largest x, y and z.")]
 
     @model_validator(mode="after")
     def _has_volume(self) -> Self:
@@ -143,41 +132,27 @@ class MeshShape(_Body):
     asset: Annotated[
         str | None, Field(min_length=1), OMITTABLE, hint("File", "A mesh file: OBJ, PLY, STL or GLB.")
     ] = None
-    vertices: Annotated[Points | None, OMITTABLE, hint("Vertices", "Rows of x, y, z.", unit="m", widget="number")] = (
-        None
-    )
+    vertices: Annotated[Points | None, OMITTABLE, entry("Vertices", "Rows of x, y, z.")] = None
     faces: Annotated[
         Triangles | None,
         OMITTABLE,
-        hint(
-            "Faces",
-            "Rows of three vertex numbers, from 0, counter-clockwise seen from outside.",
-            unit="",
-            widget="number",
-        ),
+        entry("Faces", "Rows of three vertex numbers, from 0, counter-clockwise seen from outside.", unit=""),
     ] = None
-    normals: Annotated[
-        Directions | None, OMITTABLE, hint("Normals", "One row per vertex.", unit="", widget="number")
-    ] = None
+    normals: Annotated[Directions | None, OMITTABLE, entry("Normals", "One row per vertex.", unit="")] = None
     uvs: Annotated[
         Coordinates | None,
         OMITTABLE,
-        hint("Texture coordinates", "One row of u and v per vertex; v points up.", unit="", widget="number"),
+        entry("Texture coordinates", "One row of u and v per vertex; v points up.", unit=""),
     ] = None
     colors: Annotated[
         Colors | None,
         OMITTABLE,
-        hint(
-            "Vertex colours",
-            "One row per vertex, linear, perhaps with alpha; they multiply the material's.",
-            unit="",
-            widget="number",
+        entry(
+            "Vertex colours", "One row per vertex, linear, perhaps with alpha; they multiply the material's.", unit=""
         ),
     ] = None
     smooth: Annotated[
-        bool | None,
-        OMITTABLE,
-        hint("Smooth", "On: rounded; off: with flat facets; neither: as the file says."),
+        bool | None, OMITTABLE, hint("Smooth", "On: rounded; off: with flat facets; neither: as the file says.")
     ] = None
     double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there.")] = True
     displacement: Annotated[
@@ -186,11 +161,9 @@ class MeshShape(_Body):
     max_edge: Annotated[
         PositiveLength | None,
         OMITTABLE,
-        hint(
+        entry(
             "Longest edge",
             "The longest edge of the triangles: shorter edges show finer relief and take more memory.",
-            unit="m",
-            widget="number",
             absent="1/200 of its size",
         ),
     ] = None

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Discriminator, PlainValidator, Tag, WithJsonSchema
 
-from service.document.base import Model, hint, refusal
+from service.document.base import Model, dial, entry, refusal
 from service.document.numbers import LARGEST, Point, ScaleFactors, check_number, described, vector_schema
 
 # The volume that the axes span once each has length one. Below it the inverse has no digit right in float32.
@@ -21,22 +21,22 @@ Matrix = tuple[float, ...]
 class Transform(Model):
     """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
 
-    translate: Annotated[Point, hint("Move", "Moves the thing along X, Y and Z.", unit="m", widget="number")] = (
+    translate: Annotated[Point, entry("Move", "Moves the thing along X, Y and Z.")] = (
         0.0,
         0.0,
         0.0,
     )
-    rotate: Annotated[
-        Point,
-        hint("Rotate", "Turns the thing about X, then Y, then Z.", unit="degrees", widget="angle", soft=(-180, 180)),
-    ] = (0.0, 0.0, 0.0)
+    rotate: Annotated[Point, dial("Rotate", "Turns the thing about X, then Y, then Z.", soft=(-180, 180))] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     scale: Annotated[
         ScaleFactors,
-        hint(
+        entry(
             "Scale",
             "How large the thing is: one factor, or one for each axis. Negative factors mirror it.",
             unit="",
-            widget="number",
             soft=(0.1, 10),
         ),
     ] = (1.0, 1.0, 1.0)
@@ -79,7 +79,7 @@ class MatrixTransform(Model):
         Matrix,
         PlainValidator(_matrix),
         WithJsonSchema({**vector_schema(), "minItems": 16, "maxItems": 16}),
-        hint("Matrix", "16 numbers, row by row; the last row is 0 0 0 1.", unit="", widget="number"),
+        entry("Matrix", "16 numbers, row by row; the last row is 0 0 0 1.", unit=""),
     ]
 
     def matrix4(self) -> np.ndarray:

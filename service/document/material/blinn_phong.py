@@ -6,20 +6,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict
 
-from service.document.base import Width, hint
+from service.document.base import Width, picker, slider
 from service.document.material.surface import Surface
 from service.document.texture import AnyFactor, AnyRadiometric, AnyReflectance
 
 
 def shininess(width: Width) -> Any:
     """The hint of an exponent."""
-    return hint(
+    return slider(
         "Shininess",
         "How tight the highlight is: 10 is dull, 100 is polished, 1000 is close to a mirror.",
-        group="Specular",
+        "Specular",
         highlight=(width, "specular"),
-        unit="",
-        widget="slider",
         soft=1000,
     )
 
@@ -30,34 +28,20 @@ class BlinnPhongMaterial(Surface):
     model_config = ConfigDict(json_schema_extra={"x-name": "Blinn-Phong"})
     type: Literal["blinn_phong"]
     diffuse: Annotated[
-        AnyReflectance,
-        hint(
-            "Diffuse",
-            "Share of light that is sent back equally in all directions.",
-            group="Base",
-            unit="",
-            widget="color",
-        ),
+        AnyReflectance, picker("Diffuse", "Share of light that is sent back equally in all directions.", "Base")
     ]
     specular: Annotated[
         AnyReflectance,
-        hint(
-            "Specular",
-            "The colour of the highlight. A sharper highlight sends back less light.",
-            group="Specular",
-            unit="",
-            widget="color",
-        ),
+        picker("Specular", "The colour of the highlight. A sharper highlight sends back less light.", "Specular"),
     ]
     shininess: Annotated[AnyFactor, shininess("exponent")]
     ambient: Annotated[
         AnyRadiometric,
-        hint(
+        picker(
             "Ambient",
             "Light that is added wherever the surface is seen; it does not light other things.",
-            group="Emission",
+            "Emission",
             unit="W/(m^2 sr)",
-            widget="color",
             soft=1,
         ),
     ] = (0.0, 0.0, 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from service.document.base import hint
+from service.document.base import picker
 from service.document.material.surface import Surface
 from service.document.texture import AnyReflectance
 
@@ -15,12 +15,10 @@ class DiffuseMaterial(Surface):
     type: Literal["diffuse"]
     albedo: Annotated[
         AnyReflectance,
-        hint(
+        picker(
             "Albedo",
             "The colour, as the share of light that is sent back: snow 0.9, white paint 0.8, grass 0.25, "
             "charcoal 0.04.",
-            group="Base",
-            unit="",
-            widget="color",
+            "Base",
         ),
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from service.document.base import hint
+from service.document.base import hint, slider
 from service.document.material.parameters import BaseColor, Metallic, Roughness
 from service.document.material.surface import Surface
 from service.document.texture import AnyFraction
@@ -16,51 +16,35 @@ class DisneyMaterial(Surface):
     type: Literal["disney"]
     base_color: BaseColor = (0.5, 0.5, 0.5)
     subsurface: Annotated[
-        AnyFraction,
-        hint(
-            "Subsurface",
-            "A flatter, softer shade, as of skin or wax.",
-            group="Subsurface",
-            unit="",
-            widget="slider",
-        ),
+        AnyFraction, slider("Subsurface", "A flatter, softer shade, as of skin or wax.", "Subsurface")
     ] = 0.0
     metallic: Metallic = 0.0
     specular: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Specular",
             "How much the surface mirrors where you look straight at it: 0.5 is 4 %, as of plastic and glass.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
         ),
     ] = 0.5
     specular_tint: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Specular tint",
             "Tints the reflection with the base colour where you look straight at it; the rim stays white.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
         ),
     ] = 0.0
     roughness: Roughness = 0.5
     anisotropic: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Anisotropic",
             "Stretches the highlight, as on brushed metal: at 1 it is ten times as long as wide.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
         ),
     ] = 0.0
-    sheen: Annotated[
-        AnyFraction,
-        hint("Sheen", "A soft bright rim, as of cloth.", group="Sheen", unit="", widget="slider"),
-    ] = 0.0
+    sheen: Annotated[AnyFraction, slider("Sheen", "A soft bright rim, as of cloth.", "Sheen")] = 0.0
     sheen_tint: Annotated[
         AnyFraction,
         hint(
@@ -72,24 +56,8 @@ class DisneyMaterial(Surface):
             unless="sheen_color",  # of the model that extends this one
         ),
     ] = 0.5
-    clearcoat: Annotated[
-        AnyFraction,
-        hint(
-            "Clearcoat",
-            "A thin layer of clear lacquer on top.",
-            group="Coat",
-            unit="",
-            widget="slider",
-        ),
-    ] = 0.0
+    clearcoat: Annotated[AnyFraction, slider("Clearcoat", "A thin layer of clear lacquer on top.", "Coat")] = 0.0
     clearcoat_gloss: Annotated[
         AnyFraction,
-        hint(
-            "Clearcoat gloss",
-            "1 is a glossy lacquer, 0 a satin one.",
-            group="Coat",
-            unit="",
-            widget="slider",
-            unless="clearcoat_roughness",
-        ),
+        slider("Clearcoat gloss", "1 is a glossy lacquer, 0 a satin one.", "Coat", unless="clearcoat_roughness"),
     ] = 1.0

@@ -21,10 +21,5 @@ class MeasuredMaterial(Surface):
     asset: Annotated[
         str,
         Field(min_length=1),
-        hint(
-            "Measurement",
-            "A MERL .binary or an RGL .bsdf file.",
-            group="Base",
-            asset=("measured", (".binary", ".bsdf")),
-        ),
+        hint("Measurement", "A MERL .binary or an RGL .bsdf file.", "Base", asset=("measured", (".binary", ".bsdf"))),
     ]

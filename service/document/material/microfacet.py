@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from service.document.base import OMITTABLE, hint, refusal
+from service.document.base import OMITTABLE, entry, hint, picker, refusal, slider
 from service.document.material.parameters import ConductorIndex, Extinction
 from service.document.material.surface import SolidSurface
 from service.document.numbers import Fraction, RefractiveIndex, rounded
@@ -58,71 +58,58 @@ class MicrofacetMaterial(SolidSurface):
 
     type: Literal["microfacet"]
     distribution: Annotated[
-        Distribution,
-        hint("Distribution", "How the tiny facets of the surface are tilted (D).", group="Specular"),
+        Distribution, hint("Distribution", "How the tiny facets of the surface are tilted (D).", "Specular")
     ] = "ggx"
     alpha: Annotated[
         AnyAlpha,
-        hint(
+        slider(
             "Alpha",
             "How wide the highlight is; for Phong an exponent, for ABC an inverse width.",
-            group="Specular",
+            "Specular",
             highlight=("alpha", "f0"),
-            unit="",
-            widget="slider",
             soft=(0.01, 1.0),
             ranges=("distribution", ALPHA_RANGES),
         ),
     ] = 0.25
     gamma: Annotated[
         Annotated[float, Field(ge=ANY_GAMMA[0], le=ANY_GAMMA[1])],
-        hint(
+        slider(
             "Gamma",
             "How soon the highlight fades towards its rim.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
             soft=(0.1, 10.0),
             ranges=("distribution", dict(GAMMA_RANGES)),
             used=("distribution", list(GAMMA_RANGES)),
         ),
     ] = 2.0
-    geometry: Annotated[
-        Geometry,
-        hint("Geometry", "How the tiny facets hide each other (G).", group="Specular"),
-    ] = "smith"
-    fresnel: Annotated[Fresnel, hint("Fresnel", "How one facet mirrors (F).", group="Specular")] = "schlick"
+    geometry: Annotated[Geometry, hint("Geometry", "How the tiny facets hide each other (G).", "Specular")] = "smith"
+    fresnel: Annotated[Fresnel, hint("Fresnel", "How one facet mirrors (F).", "Specular")] = "schlick"
     f0: Annotated[
         AnyReflectance,
-        hint(
+        picker(
             "F0",
             "How much is mirrored where you look straight at it.",
-            group="Specular",
-            unit="",
-            widget="color",
+            "Specular",
             used=("fresnel", ["schlick", "cook_torrance"]),
         ),
     ] = (0.04, 0.04, 0.04)
     ior: Annotated[
         RefractiveIndex,
-        hint(
+        slider(
             "Index of refraction",
             "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
             used=("fresnel", ["dielectric"]),
         ),
     ] = 1.5
     conductor_eta: Annotated[
         ConductorIndex | None,
         OMITTABLE,
-        hint(
+        entry(
             "n (metal)",
             "The index of refraction as measured, for red, green and blue.",
-            group="Specular",
+            "Specular",
             unit="",
-            widget="number",
             used=("fresnel", ["conductor"]),
             example=[0.2, 0.9, 1.1],
         ),
@@ -130,37 +117,25 @@ class MicrofacetMaterial(SolidSurface):
     conductor_k: Annotated[
         Extinction | None,
         OMITTABLE,
-        hint(
+        entry(
             "k (metal)",
             "The extinction coefficient as measured, for red, green and blue.",
-            group="Specular",
+            "Specular",
             unit="",
-            widget="number",
             used=("fresnel", ["conductor"]),
             example=[3.9, 2.4, 2.2],
         ),
     ] = None
     diffuse: Annotated[
-        AnyReflectance,
-        hint(
-            "Diffuse",
-            "The colour of the matte part, which is added to the highlight.",
-            group="Base",
-            unit="",
-            widget="color",
-        ),
+        AnyReflectance, picker("Diffuse", "The colour of the matte part, which is added to the highlight.", "Base")
     ] = (0.0, 0.0, 0.0)
-    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "How the matte part is shaded.", group="Base")] = (
-        "lambert"
-    )
+    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "How the matte part is shaded.", "Base")] = "lambert"
     diffuse_roughness: Annotated[
         Fraction,
-        hint(
+        slider(
             "Diffuse roughness",
             "How flat the matte part looks, as clay or plaster do.",
-            group="Base",
-            unit="",
-            widget="slider",
+            "Base",
             used=("diffuse_model", ["oren_nayar", "disney", "eon"]),
         ),
     ] = 0.0

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from service.document.base import OMITTABLE, hint
+from service.document.base import OMITTABLE, entry, hint, picker, slider
 from service.document.material import openpbr_film as film
 from service.document.material import openpbr_words, subsurface
 from service.document.material.parameters import Abbe, Tangent, dispersion, turn_of
@@ -35,136 +35,85 @@ class OpenpbrMaterial(AnySurface):
     model_config = ConfigDict(json_schema_extra={"x-name": "OpenPBR"})
 
     type: Literal["openpbr"]
-    base_weight: Annotated[
-        AnyFraction,
-        hint("Base weight", "How strong the base colour is.", group="Base", unit="", widget="slider"),
-    ] = 1.0
+    base_weight: Annotated[AnyFraction, slider("Base weight", "How strong the base colour is.", "Base")] = 1.0
     base_color: Annotated[
         AnyReflectance,
-        hint(
+        picker(
             "Base colour",
             "The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9.",
-            group="Base",
-            unit="",
-            widget="color",
+            "Base",
         ),
     ] = (0.8, 0.8, 0.8)
     base_diffuse_roughness: Annotated[
         AnyFraction,
-        hint(
-            "Diffuse roughness",
-            "0 is smooth; above it the surface looks flatter, as clay or plaster do.",
-            group="Base",
-            unit="",
-            widget="slider",
+        slider(
+            "Diffuse roughness", "0 is smooth; above it the surface looks flatter, as clay or plaster do.", "Base"
         ),
     ] = 0.0
     base_metalness: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Metalness",
             "0 is no metal, 1 is metal. Values between are for dust, rust or blends.",
+            "Base",
             known_as="metallic",
-            group="Base",
-            unit="",
-            widget="slider",
         ),
     ] = 0.0
     specular_weight: Annotated[
-        AnyFactor,
-        hint(
-            "Specular weight",
-            "How strongly the surface mirrors.",
-            group="Specular",
-            unit="",
-            widget="slider",
-            soft=1,
-        ),
+        AnyFactor, slider("Specular weight", "How strongly the surface mirrors.", "Specular", soft=1)
     ] = 1.0
     specular_color: Annotated[
-        AnyReflectance,
-        hint(
-            "Specular colour",
-            "Tints the reflection; of a metal, only its rim.",
-            group="Specular",
-            unit="",
-            widget="color",
-        ),
+        AnyReflectance, picker("Specular colour", "Tints the reflection; of a metal, only its rim.", "Specular")
     ] = (1.0, 1.0, 1.0)
     specular_roughness: Annotated[
         AnyFraction,
-        hint(
-            "Roughness",
-            "0 is polished, 1 is matte.",
-            known_as="roughness",
-            group="Specular",
-            highlight=("roughness", None),
-            unit="",
-            widget="slider",
+        slider(
+            "Roughness", "0 is polished, 1 is matte.", "Specular", known_as="roughness", highlight=("roughness", None)
         ),
     ] = 0.3
     specular_roughness_anisotropy: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Anisotropy",
             "Stretches the highlight, as on brushed metal; above 0.9 nothing changes any more.",
+            "Specular",
             known_as="anisotropic",
-            group="Specular",
-            unit="",
-            widget="slider",
         ),
     ] = 0.0
     specular_ior: Annotated[
         film.AnyPositiveIndex,
-        hint(
+        slider(
             "Index of refraction",
             "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. A texture gives 1 to 4.",
+            "Specular",
             known_as="ior",
-            group="Specular",
-            unit="",
-            widget="slider",
             soft=(1, 3),
         ),
     ] = 1.5
     transmission_weight: Annotated[
         AnyFraction,
-        hint(
-            "Transmission",
-            "How clear the material is: 1 is glass.",
-            known_as="transmission",
-            group="Transmission",
-            unit="",
-            widget="slider",
-        ),
+        slider("Transmission", "How clear the material is: 1 is glass.", "Transmission", known_as="transmission"),
     ] = 0.0
     transmission_color: Annotated[
         AnyReflectance,
-        hint(
-            "Transmission colour",
-            "The colour of light that has gone through the material.",
-            group="Transmission",
-            unit="",
-            widget="color",
-        ),
+        picker("Transmission colour", "The colour of light that has gone through the material.", "Transmission"),
     ] = (1.0, 1.0, 1.0)
     transmission_depth: subsurface.Depth = 0.0
     transmission_scatter: subsurface.Scatter = (0.0, 0.0, 0.0)
     transmission_scatter_anisotropy: subsurface.ScatterAnisotropy = 0.0
     transmission_dispersion_scale: Annotated[
         Fraction,
-        hint(
-            "Dispersion", "How much light is split into colours, as by a prism: 0 is not at all.",
-            group="Transmission", unit="", widget="slider",
-        ),
-    ] = 0.0  # fmt: skip
+        slider("Dispersion", "How much light is split into colours, as by a prism: 0 is not at all.", "Transmission"),
+    ] = 0.0
     transmission_dispersion_abbe_number: Annotated[
         Abbe,
-        hint(
+        slider(
             "Abbe number",
             "Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60.",
-            group="Transmission", unit="", widget="slider", soft=(9, 91),
+            "Transmission",
+            soft=(9, 91),
         ),
-    ] = 20.0  # fmt: skip
+    ] = 20.0
     subsurface_weight: subsurface.Weight = 0.0
     subsurface_color: subsurface.Color = (0.8, 0.8, 0.8)
     subsurface_radius: subsurface.Radius = 1.0
@@ -172,91 +121,44 @@ class OpenpbrMaterial(AnySurface):
     subsurface_scatter_anisotropy: subsurface.Anisotropy = 0.0
     coat_weight: Annotated[
         AnyFraction,
-        hint(
-            "Coat",
-            "How much of the surface is covered by clear lacquer.",
-            known_as="clearcoat",
-            group="Coat",
-            unit="",
-            widget="slider",
-        ),
+        slider("Coat", "How much of the surface is covered by clear lacquer.", "Coat", known_as="clearcoat"),
     ] = 0.0
-    coat_color: Annotated[
-        AnyReflectance,
-        hint(
-            "Coat colour",
-            "The tint of the lacquer.",
-            group="Coat",
-            unit="",
-            widget="color",
-        ),
-    ] = (1.0, 1.0, 1.0)
+    coat_color: Annotated[AnyReflectance, picker("Coat colour", "The tint of the lacquer.", "Coat")] = (1.0, 1.0, 1.0)
     coat_roughness: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Coat roughness",
             "How rough the lacquer is: 0 is a perfect varnish.",
+            "Coat",
             known_as="clearcoat_roughness",
-            group="Coat",
-            unit="",
-            widget="slider",
         ),
     ] = 0.0
     coat_roughness_anisotropy: Annotated[
-        AnyFraction,
-        hint(
-            "Coat anisotropy",
-            "Stretches the highlight of the lacquer.",
-            group="Coat",
-            unit="",
-            widget="slider",
-        ),
+        AnyFraction, slider("Coat anisotropy", "Stretches the highlight of the lacquer.", "Coat")
     ] = 0.0
     coat_ior: Annotated[
         film.AnyPositiveIndex,
-        hint(
-            "Coat index", "How strongly the lacquer bends and mirrors light: 1.5 to 1.6.",
-            group="Coat", unit="", widget="slider", soft=(1, 3),
-        ),
-    ] = 1.6  # fmt: skip
+        slider("Coat index", "How strongly the lacquer bends and mirrors light: 1.5 to 1.6.", "Coat", soft=(1, 3)),
+    ] = 1.6
     coat_darkening: Annotated[
         AnyFraction,
-        hint(
-            "Coat darkening", "How much the lacquer deepens the colours under it, as varnish does wood.",
-            group="Coat", unit="", widget="slider",
-        ),
-    ] = 1.0  # fmt: skip
+        slider("Coat darkening", "How much the lacquer deepens the colours under it, as varnish does wood.", "Coat"),
+    ] = 1.0
     fuzz_weight: Annotated[
         AnyFraction,
-        hint(
-            "Fuzz",
-            "How much of the surface is covered by fibres or dust.",
-            known_as="sheen",
-            group="Sheen",
-            unit="",
-            widget="slider",
-        ),
+        slider("Fuzz", "How much of the surface is covered by fibres or dust.", "Sheen", known_as="sheen"),
     ] = 0.0
     fuzz_color: Annotated[
         AnyReflectance,
-        hint(
-            "Fuzz colour",
-            "The colour of the fibres or the dust.",
-            known_as="sheen_color",
-            group="Sheen",
-            unit="",
-            widget="color",
-        ),
+        picker("Fuzz colour", "The colour of the fibres or the dust.", "Sheen", known_as="sheen_color"),
     ] = (1.0, 1.0, 1.0)
     fuzz_roughness: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Fuzz roughness",
             "How far the fuzz reaches inwards from the rim: cloth is low, dust high.",
+            "Sheen",
             known_as="sheen_roughness",
-            group="Sheen",
-            unit="",
-            widget="slider",
         ),
     ] = 0.5
     thin_film_weight: film.FilmWeight = 0.0
@@ -264,57 +166,49 @@ class OpenpbrMaterial(AnySurface):
     thin_film_ior: film.FilmIndex = 1.4
     emission_luminance: Annotated[
         Luminance,
-        hint(
+        slider(
             "Emission",
             "The light that leaves the front side. Above 0 the thing is a lamp.",
-            group="Emission",
+            "Emission",
             unit="cd/m^2",
-            widget="slider",
             soft=1000,
         ),
     ] = 0.0
     emission_color: Annotated[
-        AnyRadiometric,
-        hint("Emission colour", "The colour of the light.", group="Emission", unit="", widget="color", soft=1),
+        AnyRadiometric, picker("Emission colour", "The colour of the light.", "Emission", soft=1)
     ] = (1.0, 1.0, 1.0)
     emission_sides: EmissionSides = "front"
     geometry_opacity: Annotated[
         AnyFraction,
-        hint(
-            "Opacity",
-            "1 is solid, 0.5 a fine mesh, 0 is not there at all.",
-            known_as="alpha",
-            group="Geometry",
-            unit="",
-            widget="slider",
-        ),
+        slider("Opacity", "1 is solid, 0.5 a fine mesh, 0 is not there at all.", "Geometry", known_as="alpha"),
     ] = 1.0
     geometry_thin_walled: Annotated[
         bool,
         hint(
-            "Thin walled", "A sheet without an inside, such as a window pane: light goes straight through.",
-            known_as="thin_walled", group="Geometry",
+            "Thin walled",
+            "A sheet without an inside, such as a window pane: light goes straight through.",
+            "Geometry",
+            known_as="thin_walled",
         ),
-    ] = False  # fmt: skip
+    ] = False
     geometry_normal: Annotated[
         NormalTexture | None,
         OMITTABLE,
         hint(
             "Normal map",
             "Small bumps: an image that changes how the surface catches the light, but not its outline.",
+            "Geometry",
             known_as="normal_map",
-            group="Geometry",
         ),
     ] = None
     geometry_tangent: Annotated[
         Tangent | None,
         OMITTABLE,
-        hint(
+        entry(
             "Tangent",
             "The direction in which highlights are stretched, along the texture coordinates u and v.",
-            group="Geometry",
+            "Geometry",
             unit="",
-            widget="number",
             absent="along u",
         ),
     ] = None
@@ -324,18 +218,21 @@ class OpenpbrMaterial(AnySurface):
         hint(
             "Coat normal map",
             "Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it.",
+            "Coat",
             known_as="clearcoat_normal_map",
-            group="Coat",
         ),
     ] = None
     geometry_coat_tangent: Annotated[
         Tangent | None,
         OMITTABLE,
-        hint(
-            "Coat tangent", "The direction in which the highlights of the lacquer are stretched.",
-            group="Coat", unit="", widget="number", absent="along u",
+        entry(
+            "Coat tangent",
+            "The direction in which the highlights of the lacquer are stretched.",
+            "Coat",
+            unit="",
+            absent="along u",
         ),
-    ] = None  # fmt: skip
+    ] = None
     height: Height = None
 
     def value(self, name: str) -> Any:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Discriminator, Field, Tag
 
-from service.document.base import hint
+from service.document.base import slider
 from service.document.texture import REFERENCE_TAG, VALUE_TAG, AnyFactor, AnyFraction, ScalarTexture, form_of
 
 LEAST_INDEX, LARGEST_INDEX = 1e-3, 1e3
@@ -18,35 +18,19 @@ AnyPositiveIndex = Annotated[
 ]
 FilmWeight = Annotated[
     AnyFraction,
-    hint(
-        "Thin film",
-        "How much of the surface has a thin film, with the colours of a soap bubble.",
-        group="Film",
-        unit="",
-        widget="slider",
-    ),
+    slider("Thin film", "How much of the surface has a thin film, with the colours of a soap bubble.", "Film"),
 ]
 FilmThickness = Annotated[
-    AnyFactor,
-    hint(
-        "Film thickness",
-        "Soap 0.2 to 0.8, oxides of metals 0.03 to 0.2.",
-        group="Film",
-        unit="um",
-        widget="slider",
-        soft=1,
-    ),
+    AnyFactor, slider("Film thickness", "Soap 0.2 to 0.8, oxides of metals 0.03 to 0.2.", "Film", unit="um", soft=1)
 ]
 FilmIndex = Annotated[
     AnyPositiveIndex,
-    hint(
+    slider(
         "Film index",
         "How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6. A texture gives 1 "
         "to 4.",
+        "Film",
         known_as="film_ior",
-        group="Film",
-        unit="",
-        widget="slider",
         soft=(1, 3),
     ),
 ]

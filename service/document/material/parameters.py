@@ -8,41 +8,24 @@ from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
-from service.document.base import hint, refusal
+from service.document.base import picker, refusal, slider
 from service.document.color import Color
 from service.document.numbers import LARGEST, Vec3, check_number, described, is_number, vector, vector_schema
 from service.document.texture import AnyFraction, AnyReflectance
 
 BaseColor = Annotated[
     AnyReflectance,
-    hint(
+    picker(
         "Base colour",
         "The colour of the surface, or of a metal's reflection. Real surfaces lie between 0.03 and 0.9.",
-        group="Base",
-        unit="",
-        widget="color",
+        "Base",
     ),
 ]
 Metallic = Annotated[
-    AnyFraction,
-    hint(
-        "Metallic",
-        "0 is no metal, 1 is metal. Values between are for dust, rust or blends.",
-        group="Base",
-        unit="",
-        widget="slider",
-    ),
+    AnyFraction, slider("Metallic", "0 is no metal, 1 is metal. Values between are for dust, rust or blends.", "Base")
 ]
 Roughness = Annotated[
-    AnyFraction,
-    hint(
-        "Roughness",
-        "0 is polished, 1 is matte.",
-        group="Base",
-        highlight=("roughness", None),
-        unit="",
-        widget="slider",
-    ),
+    AnyFraction, slider("Roughness", "0 is polished, 1 is matte.", "Base", highlight=("roughness", None))
 ]
 # Dispersion by the Abbe number, (n_d - 1) / (n_F - n_C) at 587.56, 486.13 and 656.27 nm.
 MOST_ABBE = 1e30  # of its inverse, which single precision holds; an index far less dispersed reaches its bounds

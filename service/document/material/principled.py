@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
-from service.document.base import OMITTABLE, hint, refusal
+from service.document.base import OMITTABLE, dial, entry, hint, picker, refusal, slider
 from service.document.material import openpbr_words
 from service.document.material.disney import DisneyMaterial
 from service.document.material.parameters import Abbe, ConductorIndex, Extinction, dispersion
@@ -41,71 +41,55 @@ class PrincipledMaterial(DisneyMaterial):
     type: Literal["principled"]  # type: ignore[assignment]
     subsurface: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Subsurface",
             "Share of the diffuse light that comes out beside where it went in; without a radius a flatter shade.",
-            group="Subsurface",
-            unit="",
-            widget="slider",
+            "Subsurface",
         ),
     ] = 0.0
     subsurface_radius: WalkRadius = None
     transmission: Annotated[
-        AnyFraction,
-        hint(
-            "Transmission",
-            "How clear the material is: 1 is glass.",
-            group="Transmission",
-            unit="",
-            widget="slider",
-        ),
+        AnyFraction, slider("Transmission", "How clear the material is: 1 is glass.", "Transmission")
     ] = 0.0
     ior: Annotated[
         AnyIndex | None,
         OMITTABLE,
-        hint(
+        slider(
             "Index of refraction",
             "How strongly light is bent and mirrored: water 1.33, glass 1.5, diamond 2.42. It takes the place of "
             "specular.",
-            group="Specular",
-            unit="",
-            widget="slider",
+            "Specular",
             follows=("specular", index_of_specular),
         ),
     ] = None
     abbe: Annotated[
         Abbe | None,
         OMITTABLE,
-        hint(
+        slider(
             "Abbe number",
             "Splits light into colours as a prism does: the lower, the more. Flint 30, diamond 55, crown glass 60.",
-            group="Transmission",
-            unit="",
-            widget="slider",
+            "Transmission",
             soft=(10, 100),
             absent="none",
         ),
     ] = None
     attenuation_color: Annotated[
         AnyReflectance,
-        hint(
+        picker(
             "Attenuation colour",
             "The colour of white light after the attenuation distance through the material.",
-            group="Transmission",
-            unit="",
-            widget="color",
+            "Transmission",
         ),
     ] = (1.0, 1.0, 1.0)
     attenuation_distance: Annotated[
         AnyLength | None,
         OMITTABLE,
-        hint(
+        slider(
             "Attenuation distance",
             "How far light goes through the material until it has the attenuation colour. Without it, the inside "
             "is clear.",
-            group="Transmission",
+            "Transmission",
             unit="m",
-            widget="slider",
             soft=5,
             log=1e-4,
             absent="clear",
@@ -116,96 +100,77 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Thin walled",
             "A sheet without an inside, such as a window pane or a leaf: light goes straight through.",
-            group="Transmission",
+            "Transmission",
         ),
     ] = False
     diffuse_transmission: Annotated[
         AnyFraction,
-        hint(
+        slider(
             "Diffuse transmission",
             "How much light shines through, as through leaves and paper. Above 0 the thing is a thin sheet.",
-            group="Transmission",
-            unit="",
-            widget="slider",
+            "Transmission",
         ),
     ] = 0.0
     diffuse_transmission_color: Annotated[
         AnyReflectance | None,
         OMITTABLE,
-        hint(
+        picker(
             "Diffuse transmission colour",
             "The colour of the light that shines through, in place of the base colour.",
-            group="Transmission",
-            unit="",
-            widget="color",
+            "Transmission",
             absent="base colour",
         ),
     ] = None
     specular_color: Annotated[
         AnyReflectance,
-        hint(
-            "Specular colour",
-            "Tints the reflection where you look straight at it; the rim stays white.",
-            group="Specular",
-            unit="",
-            widget="color",
+        picker(
+            "Specular colour", "Tints the reflection where you look straight at it; the rim stays white.", "Specular"
         ),
     ] = (1.0, 1.0, 1.0)
     anisotropic_rotation: Annotated[
         AnyDegrees,
-        hint(
+        dial(
             "Anisotropic rotation",
             "Turns the direction in which the highlight is stretched, counter-clockwise.",
-            group="Specular",
-            unit="degrees",
-            widget="angle",
+            "Specular",
             soft=(-180, 180),
         ),
     ] = 0.0
     sheen_color: Annotated[
         AnyReflectance | None,
         OMITTABLE,
-        hint(
+        picker(
             "Sheen colour",
             "The colour of the sheen. It takes the place of the sheen tint.",
-            group="Sheen",
-            unit="",
-            widget="color",
+            "Sheen",
             absent="by tint",
         ),
     ] = None
     sheen_roughness: Annotated[
         AnyFraction,
-        hint(
-            "Sheen roughness",
-            "How far the sheen reaches inwards from the rim: satin is low, wool high.",
-            group="Sheen",
-            unit="",
-            widget="slider",
+        slider(
+            "Sheen roughness", "How far the sheen reaches inwards from the rim: satin is low, wool high.", "Sheen"
         ),
     ] = 0.5
     clearcoat_roughness: Annotated[
         AnyFraction | None,
         OMITTABLE,
-        hint(
+        slider(
             "Clearcoat roughness",
             "How rough the lacquer is: 0 is a perfect varnish. It takes the place of the gloss.",
-            group="Coat",
-            unit="",
-            widget="slider",
+            "Coat",
             follows=("clearcoat_gloss", roughness_of_gloss),
         ),
     ] = None
     conductor_eta: Annotated[
         ConductorIndex | None,
         OMITTABLE,
-        hint(
+        entry(
             "n (metal)",
             "The index of refraction as measured, for red, green and blue. With k it takes the place of the base "
             "colour.",
-            group="Specular",
+            "Specular",
             unit="",
-            widget="number",
             absent="by base colour",
             beside="conductor_k",
             example=[0.18, 0.42, 1.37],
@@ -214,12 +179,11 @@ class PrincipledMaterial(DisneyMaterial):
     conductor_k: Annotated[
         Extinction | None,
         OMITTABLE,
-        hint(
+        entry(
             "k (metal)",
             "The extinction coefficient as measured, for red, green and blue. It goes with n.",
-            group="Specular",
+            "Specular",
             unit="",
-            widget="number",
             absent="by base colour",
             beside="conductor_eta",
             example=[3.42, 2.35, 1.77],
@@ -227,24 +191,21 @@ class PrincipledMaterial(DisneyMaterial):
     ] = None
     film_thickness: Annotated[
         AnyThickness,
-        hint(
+        slider(
             "Film thickness",
             "A thin film with the colours of a soap bubble or of oil on water: soap 200 to 800, oxides of metals "
             "30 to 200.",
-            group="Film",
+            "Film",
             unit="nm",
-            widget="slider",
             soft=1000,
         ),
     ] = 0.0
     film_ior: Annotated[
         AnyIndex,
-        hint(
+        slider(
             "Film index",
             "How strongly the film bends light: water 1.33, oil 1.47, oxides of metals 1.8 to 2.6.",
-            group="Film",
-            unit="",
-            widget="slider",
+            "Film",
             soft=(1, 3),
         ),
     ] = 1.4
@@ -254,7 +215,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Coat normal map",
             "Small bumps of the coat itself. Without it the coat is smooth, whatever lies under it.",
-            group="Coat",
+            "Coat",
         ),
     ] = None
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from service.document.base import OMITTABLE, hint
+from service.document.base import OMITTABLE, picker, slider
 from service.document.color import Reflectance
 from service.document.medium import LARGEST_G, Coefficient
 from service.document.numbers import Length
@@ -17,12 +17,11 @@ _Anisotropy = Annotated[float, Field(ge=-1, le=1)]
 WalkRadius = Annotated[
     Coefficient | None,
     OMITTABLE,
-    hint(
+    picker(
         "Subsurface radius",
         "How far light goes below the surface between turns, per channel; without it, subsurface is a flatter shade.",
-        group="Subsurface",
+        "Subsurface",
         unit="m",
-        widget="color",
         soft=1,
         log=1e-5,
         absent="flat",
@@ -30,78 +29,51 @@ WalkRadius = Annotated[
 ]
 Depth = Annotated[
     Length,
-    hint(
+    slider(
         "Transmission depth",
         "How far light goes through the material until it has the transmission colour. 0: it is tinted at the "
         "surface.",
-        group="Transmission",
+        "Transmission",
         unit="m",
-        widget="slider",
         soft=1,
         log=1e-5,
     ),
 ]
-Scatter = Annotated[
-    Reflectance,
-    hint(
-        "Transmission scatter",
-        "How milky the inside is.",
-        group="Transmission",
-        unit="",
-        widget="color",
-    ),
-]
+Scatter = Annotated[Reflectance, picker("Transmission scatter", "How milky the inside is.", "Transmission")]
 ScatterAnisotropy = Annotated[
     _Anisotropy,
-    hint(
-        "Scatter anisotropy",
-        "Where light goes when it is scattered: above 0 onwards, below 0 back.",
-        group="Transmission",
-        unit="",
-        widget="slider",
+    slider(
+        "Scatter anisotropy", "Where light goes when it is scattered: above 0 onwards, below 0 back.", "Transmission"
     ),
 ]
 Weight = Annotated[
     AnyFraction,
-    hint(
+    slider(
         "Subsurface",
         "How much of the light wanders below the surface, as in skin, wax or milk.",
+        "Subsurface",
         known_as="subsurface",
-        group="Subsurface",
-        unit="",
-        widget="slider",
     ),
 ]
 Color = Annotated[
-    AnyReflectance,
-    hint(
-        "Subsurface colour", "The colour that a thick piece of it has.", group="Subsurface", unit="", widget="color"
-    ),
+    AnyReflectance, picker("Subsurface colour", "The colour that a thick piece of it has.", "Subsurface")
 ]
 Radius = Annotated[
     Length,
-    hint(
+    slider(
         "Subsurface radius",
         "How far light goes below the surface between turns; 0: it comes back where it enters.",
-        group="Subsurface",
+        "Subsurface",
         unit="m",
-        widget="slider",
         soft=1,
         log=1e-5,
     ),
 ]
-RadiusScale = Annotated[
-    Reflectance,
-    hint("Radius scale", "A factor on the radius, per channel.", group="Subsurface", unit="", widget="color"),
-]
+RadiusScale = Annotated[Reflectance, picker("Radius scale", "A factor on the radius, per channel.", "Subsurface")]
 Anisotropy = Annotated[
     _Anisotropy,
-    hint(
-        "Subsurface anisotropy",
-        "Where light goes when it is scattered: above 0 onwards, below 0 back.",
-        group="Subsurface",
-        unit="",
-        widget="slider",
+    slider(
+        "Subsurface anisotropy", "Where light goes when it is scattered: above 0 onwards, below 0 back.", "Subsurface"
     ),
 ]
 

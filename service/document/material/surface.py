@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, get_args
 
-from service.document.base import OMITTABLE, Model, hint
+from service.document.base import OMITTABLE, Model, hint, picker, slider
 from service.document.texture import AnyFraction, AnyRadiance, HeightTexture, NormalTexture
 
 Emission = Annotated[
     AnyRadiance,
-    hint(
+    picker(
         "Emission",
         "The light that leaves the front side. Above 0 the thing is a lamp.",
-        group="Emission",
+        "Emission",
         unit="W/(m^2 sr)",
-        widget="color",
         soft=20,
     ),
 ]
 EmissionSides = Annotated[
     Literal["front", "both"],
-    hint(
-        "Emitting sides",
-        "Whether only the front shines, or the back as well.",
-        group="Emission",
-    ),
+    hint("Emitting sides", "Whether only the front shines, or the back as well.", "Emission"),
 ]
 NormalMap = Annotated[
     NormalTexture | None,
@@ -32,7 +27,7 @@ NormalMap = Annotated[
     hint(
         "Normal map",
         "Small bumps: an image that changes how the surface catches the light, but not its outline.",
-        group="Geometry",
+        "Geometry",
     ),
 ]
 Height = Annotated[
@@ -41,7 +36,7 @@ Height = Annotated[
     hint(
         "Height",
         "Relief: it changes how the surface catches the light, and moves the surface of meshes with displacement.",
-        group="Geometry",
+        "Geometry",
     ),
 ]
 
@@ -99,24 +94,15 @@ class Surface(AnySurface):
     emission: Emission = (0.0, 0.0, 0.0)
     emission_sides: EmissionSides = "front"
     alpha: Annotated[
-        AnyFraction,
-        hint(
-            "Alpha",
-            "1 is solid, 0.5 a fine mesh, 0 is not there at all.",
-            group="Geometry",
-            unit="",
-            widget="slider",
-        ),
+        AnyFraction, slider("Alpha", "1 is solid, 0.5 a fine mesh, 0 is not there at all.", "Geometry")
     ] = 1.0
     alpha_cutoff: Annotated[
         AnyFraction | None,
         OMITTABLE,
-        hint(
+        slider(
             "Alpha cutoff",
             "Cuts the shape out sharply: an opacity of at least this is solid, anything below is not there.",
-            group="Geometry",
-            unit="",
-            widget="slider",
+            "Geometry",
             absent="off",
         ),
     ] = None
