@@ -28,13 +28,11 @@ def read(file: GltfDocument, source: JsonView, name: str, *types: str) -> Array:
         values = _strided(file, place, dtype, count, width)
     elif count > 3 * file.limits.max_triangles:
         raise place.error("count", f"is {count}; a mesh has at most {3 * file.limits.max_triangles}")
-    elif "sparse" not in place:
-        if not place.value.get("extensions"):
-            raise place.error("bufferView", "is missing: the accessor has no data")
+    elif "sparse" not in place and place.value.get("extensions"):
         names = sorted(place.need("extensions").value)
         raise place.error("extensions", f"its data are there in compressed form only ({', '.join(names)[:80]})")
-    else:
-        values = np.zeros((count, width), dtype)
+    else:  # zeros, says section 5.1.1; one row stands for all until somebody changes them
+        values = np.broadcast_to(np.zeros((1, width), dtype), (count, width))
     if "sparse" in place:
         values = _replaced(file, values, place.need("sparse"))
     return normalised(values) if place.flag("normalized") else values
