@@ -7,7 +7,9 @@ obj_lines    the lines of an OBJ text by keyword, in blocks
 ply          PLY, text and binary
 stl          STL, binary and text
 polygons     polygons -> triangles
-raw_mesh     the result of a reader, and the checks that every mesh has to pass
+raw_mesh     the result of a reader
+numbers      numbers in texts, also those that are none
+bad_elements  what is left out of a mesh, and how it is told
 mesh_checks  oddities of a mesh: repeated triangles, edges of too many, inside out
 rendered     OpenEXR files that Sunbox wrote: colour, its variance and its samples
 cube         tables of colours, one or three axes

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from service.formats.errors import ParseError
 from service.formats.types import Doubles, Floats, Indices
 
 MAX_COORDINATE = 1e9  # metres; the contract's range of a coordinate
@@ -26,39 +25,6 @@ class RawMesh:
     warnings: list[str] = field(default_factory=list)
     tangents: Numbers | None = None  # (n, 4), as glTF's TANGENT; zero: none
     groups: npt.NDArray[np.integer] | None = None  # (m,) smoothing groups, 0 for facets; None: one for all
-
-
-def check_raw_mesh(parts: RawMesh, max_triangles: int) -> None:
-    """Finite, in range, bounded. Raises ParseError."""
-    vertices, faces = parts.vertices, parts.faces
-    if not len(faces):
-        raise ParseError("it has no faces")
-    if len(faces) > max_triangles:
-        raise ParseError(f"{len(faces)} triangles are more than the {max_triangles} allowed")
-    for name in ("vertices", "normals", "uvs", "uvs_1", "colors", "tangents"):
-        rows = getattr(parts, name)
-        if rows is not None and not np.isfinite(rows).all():
-            bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
-            what = OF_VERTEX[name].format(bad)
-            raise ParseError(f"{what} (counted from 0) is not finite: {rows[bad].tolist()}")
-    if len(vertices) and max(vertices.max(), -vertices.min()) > MAX_COORDINATE:
-        bad = int(np.flatnonzero((np.abs(vertices) > MAX_COORDINATE).any(axis=1))[0])
-        raise ParseError(f"vertex {bad} (counted from 0) lies beyond 1e9 m: {vertices[bad].tolist()}")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        bad = int(np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))[0])
-        raise ParseError(
-            f"triangle {bad} (counted from 0) names vertices {faces[bad].tolist()}; there are {len(vertices)}"
-        )
-
-
-OF_VERTEX = {
-    "vertices": "vertex {}",
-    "normals": "the normal of vertex {}",
-    "uvs": "the texture coordinate of vertex {}",
-    "uvs_1": "the second texture coordinate of vertex {}",
-    "colors": "the colour of vertex {}",
-    "tangents": "the tangent of vertex {}",
-}
 
 
 def unit_normals(vertices: Doubles, faces: Indices, normals: Numbers) -> Floats:

@@ -13,11 +13,12 @@ import numpy as np
 
 from service.formats.errors import MissingExtra, ParseError
 from service.formats.formats import FOREIGN, PACKAGES, text
+from service.formats.read.bad_elements import mend
 from service.formats.read.materialx.importer import ALONE, SUFFIX, read_materialx
 from service.formats.read.mesh_checks import mesh_oddities
 from service.formats.read.obj.archive import Archive
 from service.formats.read.obj.importer import read_obj_scene
-from service.formats.read.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
+from service.formats.read.raw_mesh import Numbers, RawMesh, unit_colors, unit_normals
 from service.formats.read.stl import read_stl
 from service.formats.read.texture_sets.importer import read_texture_sets
 from service.formats.types import AssetLimits, Floats, Indices, MeshData, SceneFile
@@ -26,7 +27,7 @@ from service.formats.types import AssetLimits, Floats, Indices, MeshData, SceneF
 def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     """Raises ParseError, or whatever a library raises on nonsense."""
     parts = MESH_READERS[format](data, limits)
-    check_raw_mesh(parts, limits.max_triangles)
+    mend(parts, limits.max_triangles)
     # One after the other, so that a million triangles are not there twice.
     vertices = np.ascontiguousarray(parts.vertices, np.float64)
     faces: Indices = np.ascontiguousarray(parts.faces, np.int32)

@@ -53,7 +53,7 @@ def with_instances(file: Gltf) -> None:
 
 
 def with_skin(file: Gltf) -> None:
-    joints, weights = zeros(file, "uint8", 4, 4), file.accessor(np.tile(np.float32([1, 0, 0, 0]), (4, 1)))
+    joints, weights = zeros(file, "uint8", 4, 4), file.accessor(np.tile(np.array([1, 0, 0, 0], "<f4"), (4, 1)))
     made = file.primitive()
     made["attributes"] |= {"JOINTS_0": joints, "WEIGHTS_0": weights}
     joint = file.node(translation=[0, 0, 0])

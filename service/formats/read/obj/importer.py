@@ -15,6 +15,7 @@ import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.formats import text
+from service.formats.read.bad_elements import mend
 from service.formats.read.obj.archive import Archive
 from service.formats.read.obj.materials import Materials
 from service.formats.read.obj.mtl import MtlMaterial, read_mtl
@@ -23,7 +24,7 @@ from service.formats.read.obj.textures import Textures
 from service.formats.read.obj_lines import Named
 from service.formats.read.obj_mesh import MaterialMesh, read_obj, read_obj_with_materials
 from service.formats.read.polygons import Longs
-from service.formats.read.raw_mesh import RawMesh, check_raw_mesh
+from service.formats.read.raw_mesh import RawMesh
 from service.formats.read.scenes.framing import framed
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.ply_writer import ply
@@ -42,7 +43,7 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     path = _model(archive)
     read = read_obj_with_materials(text(archive.read(path)))
     mesh = read.mesh
-    check_raw_mesh(mesh, limits.max_triangles)
+    mend(mesh, limits.max_triangles)
     notes, files = Warnings(), PartFiles()
     name = path.rpartition("/")[2]
     for warning in mesh.warnings:
