@@ -136,7 +136,7 @@ def finite_rows(
     rows: Numbers, fill: float | Sequence[float], name: Namer, otherwise: str, warnings: list[str]
 ) -> Numbers:
     """The rows, those that are not finite as `fill`, with a warning that ends in `otherwise`: what they become."""
-    finite: Mask = np.isfinite(rows).all(axis=1)
+    finite: Mask = np.asarray(np.isfinite(rows).all(axis=1))
     if finite.all():
         return rows
     bad = np.flatnonzero(~finite)

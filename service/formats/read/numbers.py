@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import warnings
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from service.formats.types import Doubles
 
@@ -19,14 +21,14 @@ def plain(text: bytes) -> bytes:
     return NO_NUMBER.sub(b"nan", text) if b"#" in text or b"n" in text or b"N" in text else text
 
 
-def quickly(text: bytes) -> Doubles | None:
+def quickly(text: bytes, dtype: type[np.generic] = np.float64) -> npt.NDArray[Any] | None:
     """The numbers of a text between blanks; None where a word is none."""
     if not text or text.isspace():
-        return np.empty(0)  # numpy would read a -1
+        return np.empty(0, dtype)  # numpy would read a -1
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns where it stops short of the end
         try:
-            return np.fromstring(text, np.float64, sep=" ")
+            return np.fromstring(text, dtype, sep=" ")
         except (ValueError, DeprecationWarning):
             return None
 

@@ -1,21 +1,18 @@
 """The statements of an OBJ file that matter, in blocks of whole lines: a file is never split into objects by line.
 
-Lines and free-form statements are skipped.
+Lines and free-form statements are only counted.
 """
 
 from __future__ import annotations
 
 import mmap
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from service.formats.errors import ParseError
 from service.formats.read.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
@@ -23,8 +20,11 @@ Letters = npt.NDArray[np.uint8]
 BLOCK = 1 << 19  # bytes; a parsed block takes some forty times as much
 NAMING = (b"usemtl", b"mtllib", b"s")
 NEWLINE, BLANK = 10, 32  # the latter and all below separate words
-NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
-CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
+COMMENT = re.compile(rb"#[^\n]*+")
+# A comment is a whole line. A backslash at its end, as of a path, carries nothing on.
+CLOSED = re.compile(rb"(?m)^([^\S\n]*+#[^\n]*?)\\++$")
+SILENT = (b"g", b"o")  # statements of no consequence: names, and their groups
+COLORS = b"#MRGB"  # ZBrush's comments with colours
 
 
 @dataclass(frozen=True)
@@ -34,29 +34,10 @@ class Lines:
     text: bytes
     lines: Longs
 
-    def error(self, row: int, what: str) -> ParseError:
-        content = self.text.split(b"\n")[row]
-        return ParseError(f"line {self.lines[row]}: {what}: {_shown(content)}")
-
     def counts(self, starts: Longs) -> Longs:
         """Words on each line, of words that begin at `starts`."""
         ends = np.flatnonzero(np.frombuffer(self.text, np.uint8) == NEWLINE)
         return np.diff(np.searchsorted(starts, ends), prepend=0)
-
-    def parse(self, text: bytes, dtype: Any, pattern: bytes, expected: int) -> npt.NDArray[Any]:
-        """`expected` numbers; where the quick parser stumbles, the pattern of a good row finds the bad one."""
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")  # numpy warns where it stops short of the end
-                values = np.fromstring(text, dtype, sep=" ")
-            if len(values) == expected:
-                return values
-        except (ValueError, DeprecationWarning):
-            pass
-        for row, content in enumerate(self.text.split(b"\n")[:-1]):
-            if not re.fullmatch(pattern, content, re.IGNORECASE):
-                raise self.error(row, "the line is not understood")
-        raise ParseError("it holds numbers that can't be read")
 
 
 @dataclass(frozen=True)
@@ -76,6 +57,8 @@ class Block:
     rows: dict[str, Lines]
     before: Longs  # (faces, 3)
     named: list[Named]
+    comments: list[bytes]  # what follows in those of COLORS
+    unread: dict[str, list[int]]  # the lines of other statements, by keyword
 
 
 def blocks(data: bytes | memoryview) -> Iterator[Block]:
@@ -87,15 +70,17 @@ def blocks(data: bytes | memoryview) -> Iterator[Block]:
         at = end
         if isinstance(view.obj, mmap.mmap):  # pages that were read need not count as this process' memory
             view.obj.madvise(mmap.MADV_DONTNEED, 0, at)
-        starts, found, others = _classified(text)
+        starts, found, others, comments = _classified(text)
         numbers = line + np.arange(len(starts))
         line += len(starts)
-        if any(mask.any() for mask in (*found.values(), others)):
-            named = list(_named(text, starts, numbers, np.flatnonzero(others), found["f"]))
+        if any(mask.any() for mask in (*found.values(), others, comments)):
+            named, unread = _named(text, starts, numbers, np.flatnonzero(others), found["f"])
             lengths = np.diff(starts, append=len(text))
             rows = {k: Lines(_taken(text, starts, lengths, mask, k), numbers[mask]) for k, mask in found.items()}
             faces = found["f"]
-            yield Block(rows, np.stack([np.cumsum(found[k])[faces] for k in ("v", "vt", "vn")], axis=1), named)
+            before: Longs = np.stack([np.cumsum(found[k])[faces] for k in ("v", "vt", "vn")], axis=1)
+            colors = [_line(text, int(starts[row]))[len(COLORS) :] for row in np.flatnonzero(comments)]
+            yield Block(rows, before, named, colors, unread)
 
 
 def _end(view: memoryview, at: int) -> int:
@@ -113,45 +98,61 @@ def _end(view: memoryview, at: int) -> int:
 
 
 def _plain(text: bytes) -> bytes:
-    """Lines that end in a newline each, with neither comments nor leading blanks; a continued line is one."""
+    """Lines that end in a newline each, without leading blanks; a continued line is one."""
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if b"\\" in text:
-        text = text.replace(b"\\\n", b" ")
-    if b"#" in text:
-        text = re.sub(rb"#[^\n]*+", b"", text)
-    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[vfums]", text):
+    if b"\\\n" in text:
+        text = (CLOSED.sub(rb"\1", text) if b"#" in text else text).replace(b"\\\n", b" ")
+    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[^\n]", text):
         text = re.sub(rb"(?m)^[\x00-\x09\x0b-\x20]++", b"", text)
     return text if text.endswith(b"\n") else text + b"\n"
 
 
-def _classified(text: bytes) -> tuple[Longs, dict[str, npt.NDArray[np.bool_]], npt.NDArray[np.bool_]]:
-    """Where lines start, which are of each keyword, and which may be a usemtl, mtllib or s."""
+Mask = npt.NDArray[np.bool_]
+
+
+def _classified(text: bytes) -> tuple[Longs, dict[str, Mask], Mask, Mask]:
+    """Where lines start, which are of each keyword, which are of others, and which are comments with colours."""
     letters = np.frombuffer(text + b"\n\n\n", np.uint8)
     ends = np.flatnonzero(letters[: len(text)] == NEWLINE)
     starts = np.concatenate([[0], ends[:-1] + 1])
     first, second, third = (letters[starts + k] for k in range(3))
     v = first == ord("v")
-    naming = ((first == ord("u")) & (second == ord("s"))) | ((first == ord("m")) & (second == ord("t")))
-    others = naming | ((first == ord("s")) & (second <= BLANK))
     keywords = {
         "v": v & (second <= BLANK),
         "vt": v & (second == ord("t")) & (third <= BLANK),
         "vn": v & (second == ord("n")) & (third <= BLANK),
         "f": (first == ord("f")) & (second <= BLANK),
     }
-    return starts, keywords, others
+    is_comment = first == ord("#")
+    others = (first > BLANK) & ~is_comment
+    for mask in keywords.values():
+        others &= ~mask
+    return starts, keywords, others, is_comment & (second == ord("M")) & (third == ord("R"))
 
 
-def _named(text: bytes, starts: Longs, numbers: Longs, rows: Longs, faces: npt.NDArray[np.bool_]) -> Iterator[Named]:
-    """The statements of `rows` that name a material, a library or a smoothing group."""
+def _line(text: bytes, start: int) -> bytes:
+    return text[start : text.index(b"\n", start)]
+
+
+def _named(
+    text: bytes, starts: Longs, numbers: Longs, rows: Longs, faces: Mask
+) -> tuple[list[Named], dict[str, list[int]]]:
+    """The statements of `rows` that name a material, a library or a smoothing group, and the lines of the others by
+    keyword."""
     before = np.cumsum(faces) if len(rows) else faces
+    named: list[Named] = []
+    unread: dict[str, list[int]] = {}
     for row in rows:
-        start = int(starts[row])
-        keyword, *rest = text[start : text.index(b"\n", start)].split(None, 1)
+        keyword, *rest = _line(text, int(starts[row])).split(None, 1)
         if keyword in NAMING:
-            name = rest[0].decode("utf-8", "replace").strip() if rest else ""
-            yield Named(keyword.decode(), name, int(numbers[row]), int(before[row]))
+            given = rest[0] if rest else b""
+            given = COMMENT.sub(b"", given) if keyword == b"s" else given
+            name = given.decode("utf-8", "replace").strip()
+            named.append(Named(keyword.decode(), name, int(numbers[row]), int(before[row])))
+        elif keyword not in SILENT:
+            unread.setdefault(keyword[:40].decode("utf-8", "replace"), []).append(int(numbers[row]))
+    return named, unread
 
 
 def _taken(text: bytes, starts: Longs, lengths: Longs, mask: npt.NDArray[np.bool_], keyword: str) -> bytes:
@@ -170,7 +171,7 @@ def starts_of_words(letters: Letters) -> Longs:
     return np.flatnonzero(~blank & np.concatenate([[True], blank[:-1]]))
 
 
-def _shown(row: bytes) -> str:
+def shown(row: bytes) -> str:
     """A row for a message: short, printable."""
     text = row[:60].decode("utf-8", "replace").strip()
     return repr(text + ("…" if len(row) > 60 else "")) if text else "nothing follows"

@@ -1,7 +1,7 @@
-"""Wavefront OBJ -> triangles, strictly. Runs in the parsing child.
+"""Wavefront OBJ -> triangles. Runs in the parsing child.
 
 This reader is our own. trimesh's silently drops faces and normals that it cannot read, accepts indices beyond the
-vertices, and reorders them. Here a face with an index that leads nowhere is left out, with a warning.
+vertices, and reorders them. Here what can't be used is left out with a warning, and everything else is there.
 """
 
 from __future__ import annotations
@@ -9,25 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from service.formats.errors import ParseError
-from service.formats.read.obj_lines import CORNERS, NUMBERS, Lines, Named, blocks, starts_of_words
+from service.formats.read.bad_elements import Mask, left_out
+from service.formats.read.obj_colors import VertexColors
+from service.formats.read.obj_lines import Block, Named, blocks
+from service.formats.read.obj_rows import NOWHERE, WIDTHS, BadRows, Faults, Ints, corners, vectors
 from service.formats.read.polygons import Longs, triangulate
 from service.formats.read.raw_mesh import Numbers, RawMesh
-from service.formats.types import Doubles
 
-Ints = npt.NDArray[np.int32]
-Faults = list[tuple[int, str]]  # lines with an index that leads nowhere, and why
-WIDTHS = {"v": 3, "vt": 2, "vn": 3}
 NAMES = {
     "v": ("vertex", "vertices"),
     "vt": ("texture coordinate", "texture coordinates"),
     "vn": ("normal", "normals"),
 }
-NOWHERE = 2**31 - 1  # an index that leads to no row, whatever the file wrote: none has so many
+INSTEAD = {"vt": "0 0 is used instead", "vn": "a computed one is used instead"}
 SHARES = 8
 MOST_NAMED = 1 << 20
+MOST_KEYWORDS, OTHERS = 20, "…"  # different statements that are told as not read, and what stands for all others
 
 
 @dataclass
@@ -35,13 +34,20 @@ class Found:
     """The contents of the blocks read so far. Corners count from 1, 0 is none; negative ones are resolved already."""
 
     tables: dict[str, list[Numbers]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
-    colors: list[Numbers] = field(default_factory=list)
+    bad: dict[str, BadRows] = field(default_factory=lambda: {keyword: BadRows() for keyword in WIDTHS})
+    colors: VertexColors = field(default_factory=VertexColors)
     counts: list[Ints] = field(default_factory=list)
     corners: dict[str, list[Ints]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
     lines: list[Ints] = field(default_factory=list)  # of the faces
     named: list[Named] = field(default_factory=list)  # `faces` are those of the whole file
-    faults: Faults = field(default_factory=list)
-    left_out: int = 0  # faces with an index that leads nowhere
+    faults: dict[str, Faults] = field(default_factory=lambda: {keyword: [] for keyword in WIDTHS})
+    unread: dict[str, list[int]] = field(default_factory=dict)  # lines of statements that are not read, by keyword
+    odd: list[Longs] = field(default_factory=list)  # lines with something after their numbers
+    warnings: list[str] = field(default_factory=list)
+    lost: int = 0  # corners whose texture coordinate does not exist
+    named_vertices: Mask = field(
+        default_factory=lambda: np.zeros(0, bool)
+    )  # by any face; empty where all can be read
 
     def rows(self, keyword: str) -> int:
         return sum(map(len, self.tables[keyword]))
@@ -101,28 +107,60 @@ def _found(data: bytes | memoryview) -> Found:
     for block in blocks(data):
         found.named += [replace(one, faces=one.faces + faces) for one in block.named]
         faces += len(block.before)
+        for keyword, lines in block.unread.items():
+            known = keyword in found.unread or len(found.unread) < MOST_KEYWORDS
+            found.unread.setdefault(keyword if known else OTHERS, []).extend(lines)
         rows_before = [found.rows(k) for k in WIDTHS]
-        for keyword, width in WIDTHS.items():
-            if block.rows[keyword].text:
-                table, colors = _vectors(block.rows[keyword], keyword, width)
-                found.tables[keyword].append(table)
-                if keyword == "v":
-                    found.colors.append(np.empty((0, 3)) if colors is None else colors)
+        _add_rows(found, block)
         if block.rows["f"].text:
-            lines = block.rows["f"].lines
-            counts, *corners = _corners(block.rows["f"], found.faults)
+            lines_of = block.rows["f"].lines
+            counts, *places = corners(block.rows["f"], found.faults)
             found.counts.append(counts.astype(np.int32))
-            found.lines.append(lines.astype(np.int32))
-            for k, (keyword, index) in enumerate(zip(WIDTHS, corners, strict=True)):
-                _count_back(index, counts, rows_before[k] + block.before[:, k], keyword, lines, found.faults)
-                _check(index, NOWHERE, found.rows(keyword), keyword, counts, lines, found.faults)
+            found.lines.append(lines_of.astype(np.int32))
+            for k, (keyword, index) in enumerate(zip(WIDTHS, places, strict=True)):
+                faults = found.faults[keyword]
+                _count_back(index, counts, rows_before[k] + block.before[:, k], keyword, lines_of, faults)
+                _check(index, NOWHERE, found.rows(keyword), keyword, counts, lines_of, faults)
                 found.corners[keyword].append(index.astype(np.int32))
         if len(found.named) > MOST_NAMED:
             raise ParseError(f"it has more than {MOST_NAMED} `usemtl`, `mtllib` and `s` statements")
     if not found.counts:
         raise ParseError("it has no faces")
     _leave_out(found)
+    _tell_unread(found)
     return found
+
+
+def _add_rows(found: Found, block: Block) -> None:
+    for keyword in WIDTHS:
+        if block.rows[keyword].text:
+            at = found.rows(keyword)
+            read = vectors(block.rows[keyword], keyword, at, found.bad[keyword])
+            found.tables[keyword].append(read.rows)
+            found.odd.append(read.odd)
+            if read.more is not None and read.more_counts is not None:
+                found.colors.add(at, read.more, read.more_counts)
+    found.colors.add_comments(block.comments)
+
+
+def _tell_unread(found: Found) -> None:
+    """Warn about rows that can't be read, if they did not cost a face, and about statements that are not read."""
+    for keyword, bad in found.bad.items():
+        rows = np.concatenate(bad.rows) if len(bad) else np.empty(0, np.int64)
+        if keyword == "v":
+            rows = rows[~found.named_vertices[rows]]
+        if len(rows):
+            one, many = NAMES[keyword]
+            which = f"1 {one} can't be read" if len(rows) == 1 else f"{len(rows)} {many} can't be read, the first"
+            otherwise = INSTEAD.get(keyword, "no face uses it" if len(rows) == 1 else "no face uses them")
+            found.warnings.append(f"{which}: {bad.reason(int(rows[0]))}; {otherwise}")
+    odd = np.concatenate(found.odd) if found.odd else np.empty(0, np.int64)
+    if len(odd):
+        which = f"line {odd[0]} goes" if len(odd) == 1 else f"{len(odd)} lines, the first of them {min(odd)}, go"
+        found.warnings.append(f"{which} on after their numbers with something that is not understood")
+    for keyword, lines in found.unread.items():
+        which = f"line {lines[0]} is" if len(lines) == 1 else f"{len(lines)} lines, the first of them {lines[0]}, are"
+        found.warnings.append(f"the statement {keyword!r} is not supported: {which} not read")
 
 
 def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, lines: Longs, faults: Faults) -> None:
@@ -157,43 +195,77 @@ def _check(
 
 
 def _leave_out(found: Found) -> None:
-    """Take out the faces with an index that leads nowhere. Raises ParseError where no face is left."""
+    """Take out the faces that lead nowhere or name a vertex that can't be used, and the indices of other rows that
+    lead nowhere. Raises ParseError where no face is left."""
     rows = {keyword: found.rows(keyword) for keyword in WIDTHS}
+    lost = {keyword: 0 for keyword in INSTEAD}
+    bad_vertices = found.bad["v"].mask(rows["v"]) if len(found.bad["v"]) else None
+    found.named_vertices = np.zeros(rows["v"] if bad_vertices is not None else 0, bool)
     broken = []
     for k, (counts, lines) in enumerate(zip(found.counts, found.lines, strict=True)):
+        row = np.repeat(np.arange(len(counts)), counts)
+        without = {}
+        for keyword in INSTEAD:
+            index = found.corners[keyword][k]
+            beyond = _check(index, rows[keyword], rows[keyword], keyword, counts, lines, found.faults[keyword])
+            index[beyond] = 0
+            without[keyword] = beyond
+        index = found.corners["v"][k]
+        beyond = _check(index, rows["v"], rows["v"], "v", counts, lines, found.faults["v"])
         bad = np.zeros(len(counts), bool)
-        for keyword, have in rows.items():
-            beyond = _check(found.corners[keyword][k], have, have, keyword, counts, lines, found.faults)
-            bad[np.searchsorted(np.cumsum(counts), beyond, "right")] = True
+        bad[row[beyond]] = True
+        if bad_vertices is not None:
+            is_there = index <= rows["v"]
+            found.named_vertices[index[is_there] - 1] = True
+            unusable = np.flatnonzero(is_there & bad_vertices[np.where(is_there, index, 1) - 1])
+            if len(unusable):
+                vertex = int(index[unusable[0]])
+                why = found.bad["v"].reason(vertex - 1)
+                found.faults["v"].append((int(lines[row[unusable[0]]]), f"vertex {vertex} can't be used ({why})"))
+                bad[row[unusable]] = True
         if bad.any():
             remaining = np.repeat(~bad, counts)
             found.counts[k] = counts[~bad]
             for pieces in found.corners.values():
                 pieces[k] = pieces[k][remaining]
         broken.append(bad)
+        for keyword, beyond in without.items():
+            lost[keyword] += int(np.count_nonzero(~bad[row[beyond]]))
     found.lines = []
     before = np.concatenate([[0], *broken]).cumsum()
-    found.left_out = int(before[-1])
-    if found.left_out:
+    count = int(before[-1])
+    if count:
+        reason = _first(found.faults["v"])
         if not sum(map(len, found.counts)):
-            raise ParseError("line {}: {}".format(*min(found.faults)))
+            raise ParseError(reason if count == 1 else f"none of its {count} faces can be used; {reason}")
         found.named = [replace(one, faces=one.faces - int(before[one.faces])) for one in found.named]
+        found.warnings.append(left_out(count, "face", reason))
+    for keyword, number in lost.items():
+        if number:
+            reason = _first(found.faults[keyword])
+            which = "1 corner names" if number == 1 else f"{number} corners name"
+            found.warnings.append(
+                f"{which} {NAMES[keyword][1]} that do not exist; {INSTEAD[keyword]}; the first: {reason}"
+            )
+    found.lost = lost["vt"]
+
+
+def _first(faults: Faults) -> str:
+    line, what = min(faults)
+    return f"line {line}: {what}"
 
 
 def _joined(found: Found) -> RawMesh:
     """One vertex for each distinct set of indices; the file's own where they all count alike."""
     counts = np.concatenate(found.counts).astype(np.int64)
     tables = {k: np.concatenate(found.tables[k] or [np.empty((0, width))]) for k, width in WIDTHS.items()}
-    colors = np.concatenate(found.colors or [np.empty((0, 3))])
-    found.tables, found.colors = {}, []
+    found.tables = {}
     index = {}
     for keyword in WIDTHS:
         index[keyword] = np.concatenate(found.corners.pop(keyword))
     vertices = tables["v"]
-    warnings = []
-    if found.left_out:
-        which = "1 face is left out" if found.left_out == 1 else f"{found.left_out} faces are left out, the first"
-        warnings.append("{}: line {}: {}".format(which, *min(found.faults)))
+    warnings = found.warnings
+    colors = found.colors.resolved(len(vertices), warnings)
     missing = {keyword: int(np.count_nonzero(place == 0)) for keyword, place in index.items()}
     for place in index.values():
         place -= 1  # -1: the row of zeros at the end; a normal is computed
@@ -203,12 +275,13 @@ def _joined(found: Found) -> RawMesh:
     for keyword in used:
         if missing[keyword]:
             tables[keyword] = np.concatenate([tables[keyword], np.zeros((1, WIDTHS[keyword]))])
-            if keyword == "vt":
-                warnings.append(f"{missing[keyword]} corners have no texture coordinate; they take 0 0")
+            never = missing[keyword] - found.lost
+            if keyword == "vt" and never > 0:
+                warnings.append(f"{never} corners have no texture coordinate; they take 0 0")
     triangles = None if (counts == 3).all() else triangulate(vertices, corner, counts)
     alike = all(len(tables[k]) == len(vertices) and np.array_equal(corner, place) for k, place in used.items())
     rows = {"v": vertices, **{k: tables[k] for k in used}}
-    if len(colors) == len(vertices):
+    if colors is not None:
         rows["colors"] = colors
     if not alike:
         first, joined = _distinct(corner, len(vertices), [(place, len(tables[k])) for k, place in used.items()])
@@ -242,62 +315,3 @@ def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[
         joined[these] = inverse + count
         count += len(first)
     return np.concatenate(firsts), joined
-
-
-def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
-    """The first numbers of each row; and where every row has six, as some write colours, the last three."""
-    counts = found.counts(starts_of_words(np.frombuffer(found.text, np.uint8)))
-    # A texture coordinate of one number lies on v = 0.
-    least = 1 if keyword == "vt" else width
-    if counts.min() < least:
-        needs = "a number" if least == 1 else "three numbers"
-        raise found.error(int(counts.argmin()), f"`{keyword}` needs {needs}")
-    flat = found.parse(found.text, np.float64, NUMBERS, int(counts.sum()))
-    colors = None
-    if (counts == width).all():
-        vectors: Doubles = flat.reshape(-1, width)
-    else:
-        starts = np.cumsum(counts) - counts
-        vectors = flat[np.minimum(starts[:, None] + np.arange(width), len(flat) - 1)]
-        vectors[counts[:, None] <= np.arange(width)] = 0
-        if keyword == "v" and (counts == 6).all():
-            colors = flat.reshape(-1, 6)[:, 3:]
-    if not np.isfinite(vectors).all():
-        row = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
-        raise found.error(row, f"`{keyword}` is not finite")
-    return vectors, colors
-
-
-def _corners(faces: Lines, faults: Faults) -> tuple[Longs, Longs, Longs, Longs]:
-    """The number of corners of each face, and each corner's v, vt and vn as written, 0 where absent.
-
-    A corner is v, v/vt, v//vn or v/vt/vn: the slashes before a number say which of them it is.
-    """
-    letters = np.frombuffer(faces.text, np.uint8)
-    corners = starts_of_words(letters)
-    counts = faces.counts(corners)
-    if counts.min() < 3:
-        worst = int(counts.argmin())
-        raise faces.error(worst, f"a face needs at least three corners, this one has {counts[worst]}")
-    spaced = faces.text.replace(b"/", b" ")
-    numbers = starts_of_words(np.frombuffer(spaced, np.uint8))
-    values = faces.parse(spaced, np.int64, CORNERS, len(numbers))
-    owner = np.searchsorted(corners, numbers, "right") - 1
-    slashes = np.flatnonzero(letters == ord("/"))
-    slot = np.searchsorted(slashes, numbers) - np.searchsorted(slashes, corners)[owner]
-    row = np.repeat(np.arange(len(counts)), counts)
-    long = np.flatnonzero(slot > 2)
-    if len(long):
-        raise faces.error(int(row[owner[long[0]]]), "corners are v, v/vt, v//vn or v/vt/vn")
-    zero = np.flatnonzero(values == 0)
-    if len(zero):
-        faults.append(
-            (int(faces.lines[row[owner[zero[0]]]]), "an index of 0 does not exist; they are counted from 1")
-        )
-        values[zero] = NOWHERE
-    v, vt, vn = (np.zeros(len(corners), np.int64) for _ in range(3))
-    for k, index in enumerate((v, vt, vn)):
-        index[owner[slot == k]] = values[slot == k]
-    if not v.all():
-        raise faces.error(int(row[np.flatnonzero(v == 0)[0]]), "a corner lacks its vertex")
-    return counts, v, vt, vn
