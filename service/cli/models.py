@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 WHOLE = ("glb", "zip", "ply", "stl", "usd", *formats.FOREIGN)  # formats that are one file
 SUFFIXES = tuple(f".{each}" for each, format in formats.SUFFIXES.items() if format in (*WHOLE, "gltf", "obj", "mtlx"))
-MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
+MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]*)")
 
 
 def is_model(path: Path, data: bytes) -> bool:
@@ -140,8 +140,12 @@ def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:
     from service.formats.read.obj.paths import library_names, located
 
     for statement in dict.fromkeys(MTLLIB.findall(text(data))):
-        for name in library_names(statement.decode("utf-8", "replace").strip()):
-            if not name.lower().endswith(".obj") and _is_there(located("", name), "mtllib", files):
+
+        def is_there(name: str) -> bool:
+            return not name.lower().endswith(".obj") and _is_there(located("", name), "mtllib", files)
+
+        for name in library_names(statement.decode("utf-8", "replace").strip(), is_there):
+            if is_there(name):
                 yield located("", name)
 
 
@@ -157,8 +161,9 @@ def _textures(library: str, content: bytes, files: FileAssets) -> Iterator[str]:
         return  # and its mistakes
     for material in materials.values():
         for found in material.maps.values():
-            path = located(library, found.reference)
-            if _is_there(path, found.place, files):
+            paths = (located(library, reading.reference) for reading in (found, *found.others))
+            path = next((path for path in paths if _is_there(path, found.place, files)), None)
+            if path is not None:
                 yield path
 
 

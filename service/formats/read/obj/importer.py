@@ -106,12 +106,8 @@ def _library(model: str, statements: list[Named], archive: Archive, notes: Warni
     read: set[str] = set()
     for statement in statements:
         place = f"{model.rpartition('/')[2]}:{statement.line}"
-        names = library_names(statement.name)
+        names = library_names(statement.name, lambda name: located(model, name) in archive)
         paths = [located(model, name) for name in names]
-        if len(names) > 1 and paths[0] not in archive:  # then they are several files
-            names, paths = names[1:], paths[1:]
-        else:
-            names, paths = names[:1], paths[:1]
         for name, path in zip(names, paths, strict=True):
             if path in read:
                 continue

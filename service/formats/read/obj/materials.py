@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from service.formats.read.obj.mtl import Map, MtlMaterial
+from service.formats.read.obj.paths import without_comment
 from service.formats.read.obj.textures import Textures
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.plain_mesh import GREY, NAME
@@ -31,7 +32,7 @@ class Materials:
 
     def add(self, name: str, place: str) -> str:
         """The document's name for the material that `usemtl` calls `name`."""
-        material = self.library.get(name)
+        material = self.library.get(name) or self.library.get(without_comment(name))
         if material is None and name:
             self.notes.add(place, f"the material {name[:80]!r} is not defined; a grey one is shown in its place")
         found = unique(name or NAME, self.documents)
@@ -41,6 +42,7 @@ class Materials:
     def map(self, material: MtlMaterial, keyword: str) -> Map | None:
         """A map that the mesh can show."""
         found = material.maps.get(keyword)
+        found = found and self.textures.chosen(found)
         if found is not None and not self.has_uvs:
             self.notes.add(found.place, "the mesh has no texture coordinates; it is shown without its textures")
             return None
@@ -64,7 +66,9 @@ class _Inputs(PlainInputs):
     def given(self, name: str, default: Default) -> Given | None:
         """A number or a colour, or the texture that it multiplies; 0, which would hide the texture, counts as 1."""
         found = self.owner.map(self.mtl, MAPS.get(name, ""))
-        texture = None if found is None else self.owner.textures.use(found)
+        is_color = isinstance(default, tuple)
+        channel = "" if found is None or is_color else self.owner.textures.channel(found, "a" if name == "d" else "r")
+        texture = None if found is None else self.owner.textures.use(found, is_color or channel == "a")
         if isinstance(default, tuple):
             values = self._color(name, default[0] if texture is None else 1.0)
             factor = values if max(values) else (1.0,) * 3
@@ -72,7 +76,6 @@ class _Inputs(PlainInputs):
         value = self._scalar(name, default or 0.0 if texture is None else 1.0)
         if found is None or texture is None:
             return value
-        channel = self.owner.textures.channel(found, "a" if name == "d" else "r")
         return {"texture": texture, "channel": channel, "factor": value or 1.0}
 
     def is_given(self, name: str) -> bool:
@@ -114,7 +117,11 @@ class _Inputs(PlainInputs):
         if name in ("illum", "ni", "ns", "anisor"):
             return self.mtl.number(name, default)
         if name == "d" and "d" not in self.mtl.numbers and "tr" in self.mtl.numbers:
-            return 1 - self._clamped("tr", (self.mtl.number("tr", 0.0),))[0]
+            opacity = 1 - self._clamped("tr", (self.mtl.number("tr", 0.0),))[0]
+            if opacity == 0 and self.mtl.number("illum", 2) not in wavefront.GLASS:
+                self.note("tr", "Tr 1 without d would hide the surface; it is shown opaque, as programs differ in Tr")
+                return 1.0
+            return opacity
         (value,) = self._clamped(name, (self.mtl.number(name, default),))
         if name == "aniso" and value and not self.owner.has_uvs:
             self.note(name, "anisotropy needs texture coordinates, which the mesh lacks; it is left out")

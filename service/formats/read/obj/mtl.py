@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from service.formats.errors import ParseError
+from service.formats.read.obj.paths import without_comment
 from service.formats.read.scenes.warnings import Warnings
 
 MAX_BYTES = 16 << 20  # bytes of a library; a thousand materials take 0.3 MiB
@@ -39,8 +40,10 @@ IGNORED = {
 # The number of words that follow an option of a map; `-o`, `-s` and `-t` are followed by one to three numbers.
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
            "-texres": 1, "-type": 1}  # fmt: skip
+MOST_READINGS = 16  # of one line
 VECTORS = {"-o": 0.0, "-s": 1.0, "-t": 0.0}  # the value of a number that is not given
 WORD = re.compile(r"\S+")
+COMMENT = re.compile(r"(?<!1\.)#.*")  # after numbers; `1.#QNAN` is what a C library prints for one that is none
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,7 @@ class Map:
     reference: str
     options: dict[str, tuple[str, ...]] = field(default_factory=dict)
     vectors: dict[str, tuple[float, float]] = field(default_factory=dict)
+    others: tuple[Map, ...] = ()  # other ways to read the line, where there is no file of this name
 
 
 @dataclass
@@ -94,13 +98,15 @@ def read_mtl(path: str, data: bytes, notes: Warnings) -> dict[str, MtlMaterial]:
             _add(current, keyword, rest, place, path, notes)
         else:
             notes.add(place, f"{keyword[:40]} stands before the first newmtl and is ignored")
+    for name in list(found):
+        found.setdefault(without_comment(name), found[name])
     return found
 
 
 def _statement(line: str) -> tuple[str, str]:
-    """The keyword in lower case, and the rest of the line up to a comment, which begins with # anywhere."""
-    words = line.partition("#")[0].split(None, 1)
-    if not words:
+    """The keyword in lower case, and the rest of the line; of a comment, whose first letter is #, nothing."""
+    words = line.split(None, 1)
+    if not words or words[0].startswith("#"):
         return "", ""
     keyword = words[0].lower()
     return ALIASES.get(keyword, keyword), "".join(words[1:]).strip()
@@ -130,7 +136,7 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
 
 def _numbers(keyword: str, rest: str) -> tuple[float, ...] | None:
     """One number, or the three of a colour; a single one is grey. None where they are missing or not finite."""
-    words = rest.split()
+    words = COMMENT.sub("", rest).split()
     if keyword == "d" and words[:1] == ["-halo"]:
         words = words[1:]
     try:
@@ -145,11 +151,33 @@ def _numbers(keyword: str, rest: str) -> tuple[float, ...] | None:
 
 
 def _map(rest: str, place: str, path: str) -> Map:
-    """Options come first; the rest of the line is the file's name, blanks included."""
+    """The map as the format says: options come first; the rest of the line is the file's name, blanks included. Other
+    ways to read it, `others`, end the name before options that follow it, or before a comment."""
     words = list(WORD.finditer(rest))
     found = Map(place, path, "", {}, {})
+    begin = _options(words, found)
+    if begin == len(words):
+        return found
+    start, others = words[begin].start(), []
+    for k in range(len(words) - 1, begin, -1):
+        word = words[k][0]
+        after = Map(place, path, "", dict(found.options), dict(found.vectors))
+        if word.startswith("#"):
+            words = words[:k]
+        elif not _is_option(word) or _options(words[k:], after) < len(words) - k:
+            continue
+        others.append(replace(after, reference=rest[start : words[k - 1].end()].strip('"')))
+    return replace(found, reference=rest[start:].strip('"'), others=tuple(others[:MOST_READINGS]))
+
+
+def _is_option(word: str) -> bool:
+    return word.lower() in OPTIONS or word.lower() in VECTORS
+
+
+def _options(words: list[re.Match[str]], found: Map) -> int:
+    """Read the options with which these words begin into a map; the number of words that they take."""
     k = 0
-    while k < len(words):
+    while k < len(words) and _is_option(words[k][0]):
         option = words[k][0].lower()
         if option in VECTORS:
             numbers: list[float] = []
@@ -158,14 +186,12 @@ def _map(rest: str, place: str, path: str) -> Map:
                 k += 1
             first, second = (*numbers[:2], VECTORS[option], VECTORS[option])[:2]
             found.vectors[option] = first, second
-        elif option in OPTIONS:
+        else:
             count = OPTIONS[option]
             found.options[option] = tuple(word[0] for word in words[k + 1 : k + 1 + count])
             k += count
-        else:
-            return Map(place, path, rest[words[k].start() :].strip('"'), found.options, found.vectors)
         k += 1
-    return found
+    return min(k, len(words))
 
 
 def _finite(word: str) -> float | None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Callable
 
+COMMENT = re.compile(r"\s+#(?:\s.*)?$")
 DRIVE = re.compile(r"[A-Za-z]:")
 
 
@@ -25,7 +27,12 @@ def located(source: str, reference: str) -> str:
     return posixpath.normpath(posixpath.join(posixpath.dirname(source), plain))
 
 
-def library_names(statement: str) -> list[str]:
-    """The names after `mtllib`: several files, or one whose name contains blanks."""
-    words = statement.split()
-    return [statement, *words] if len(words) > 1 else words
+def without_comment(name: str) -> str:
+    """A name without what looks like a comment after it: `#` between blanks, which `Material #25` has not."""
+    return COMMENT.sub("", name)
+
+
+def library_names(statement: str, is_there: Callable[[str], bool]) -> list[str]:
+    """The names after `mtllib`: several files, or one whose name may contain blanks. `is_there` knows the files."""
+    plain = without_comment(statement)
+    return next(([name] for name in (statement, plain) if is_there(name)), plain.split())

@@ -21,6 +21,7 @@ from service.formats.read.scenes.warnings import Warnings
 from service.formats.types import AssetLimits
 
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # by -imfchan; any channel of a grey image is luminance
+PNG, SIXTEEN = b"\x89PNG\r\n\x1a\n", b"\x10"  # how a file begins, and the depth in its header
 FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
 SMALL = 64  # texels of a side are enough to tell a normal map from heights
 BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, at least; of heights it is 0
@@ -38,13 +39,22 @@ class Textures:
     _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
     _found: dict[str, bytes | None] = field(default_factory=dict)  # images by path
 
-    def use(self, found: Map) -> str | None:
-        """The name of the texture; None, with a warning, where its image is missing or in an unsupported format."""
+    def chosen(self, found: Map) -> Map:
+        """The map, read so that there is a file of its name; as the format says where there is none."""
+        readings = (found, *found.others)
+        return next((one for one in readings if located(one.source, one.reference) in self.archive), found)
+
+    def use(self, found: Map, is_color: bool = False) -> str | None:
+        """The name of the texture; None, with a warning, where its image is missing or in an unsupported format.
+
+        Alpha is the same in either space: an image of 16 bits with both is one texture."""
         path, image = self._image(found)
         if image is None:
             return None
         self._note_options(found)
         settings: dict[str, Any] = {}
+        if image[:8] == PNG and image[24:25] == SIXTEEN:  # those of 8 bits are decoded as their use demands
+            settings["color_space"] = "srgb" if is_color else "linear"
         if found.options.get("-clamp", ("off",))[:1] == ("on",):
             settings["wrap"] = "clamp"
         for option, name, default in (("-s", "scale", 1.0), ("-o", "offset", 0.0)):
