@@ -1,5 +1,5 @@
-"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY, an
-STL or a USD file; and materials, a .mtlx with its images beside it.
+"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY
+with its textures beside it, an STL or a USD file; and materials, a .mtlx with its images beside it.
 
 The importer always reads one file: a .gltf with its files inlined, an OBJ or a .mtlx and its files as a zip.
 """
@@ -52,6 +52,8 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, 
     title = None
     if format == "obj":
         data, title = _zipped(path, data, files), "the OBJ file"
+    elif format == "ply" and (found := _ply_textures(data, files)):
+        data, format, title = _packed(path, data, ".ply", found), "zip", "the PLY file"
     elif format == "mtlx":
         data, format, title = _with_images(path, data, files), "zip", "the MaterialX file"
     elif format not in WHOLE:
@@ -107,32 +109,45 @@ def _read(uri: str, pointer: str, files: FileAssets) -> str:
 
 def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
     """A zip of the OBJ and those of its libraries and textures that exist."""
-    from service.formats.read.obj.importer import zipped
-
     found = {located: files.read(located) for located in _libraries(data, files)}
     for library, content in list(found.items()):
         found |= {image: files.read(image) for image in _textures(library, content, files)}
+    return _packed(path, data, ".obj", found)
+
+
+def _packed(path: Path, data: bytes, ending: str, found: dict[str, bytes]) -> bytes:
+    """A zip of the model and of other files by their paths from its folder."""
+    from service.formats.read.obj.importer import zipped
+
     # A path may lead out of the folder where --asset-root allows that: in the zip the model lies as deep.
     deep = max((name.split("/").count("..") for name in found), default=0)
     folder = "/".join(["model"] * deep)
-    member = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
+    member = (path.name if path.suffix.lower() == ending else f"{path.name}{ending}").replace("\\", "_")
     entries = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in found.items()}
     return zipped(entries | {posixpath.join(folder, member): data})
+
+
+def _ply_textures(data: bytes, files: FileAssets) -> dict[str, bytes]:
+    """The images that exist of those that a PLY file's comments name, by their paths from its folder."""
+    from service.formats.read.obj.paths import located
+    from service.formats.read.ply_header import read_header
+
+    try:
+        named = read_header(memoryview(data)).textures
+    except ParseError:
+        return {}  # the importer reports the mistake
+    paths = [path for name in named if _is_there(path := located("", name), "comment TextureFile", files)]
+    return {path: files.read(path) for path in paths}
 
 
 def _with_images(path: Path, data: bytes, files: FileAssets) -> bytes:
     """A zip of the MaterialX file and those of its images that exist; a larger one is refused as such."""
     from service.formats.read.materialx.document import file_names
-    from service.formats.read.obj.importer import zipped
     from service.formats.read.obj.paths import is_absolute, located
 
     found = {located("", name): name for name in file_names(data) if "://" not in name and not is_absolute(name)}
     entries = {place: files.read(place) for place, name in found.items() if _is_there(place, name, files)}
-    deep = max((name.split("/").count("..") for name in entries), default=0)
-    folder = "/".join(["model"] * deep)
-    named = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in entries.items()}
-    member = (path.name if path.suffix.lower() == ".mtlx" else f"{path.name}.mtlx").replace("\\", "_")
-    return zipped(named | {posixpath.join(folder, member): data})
+    return _packed(path, data, ".mtlx", entries)
 
 
 def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:

@@ -59,8 +59,6 @@ MAGIC = (
     (b"PK\x03\x04", "zip"),
     (CRATE, "usd"),
     (USD_TEXT, "usd"),
-    (b"ply\n", "ply"),
-    (b"ply\r", "ply"),
     (b"tensor_file\0", "bsdf"),
     (b"Kaydara FBX Binary", "fbx"),
     (b"ISO-10303-21;", "step"),
@@ -125,6 +123,7 @@ CUBE_START = re.compile(
 FBX_TEXT = re.compile(rb"\s*+;\s*FBX \d")
 THREE_DS = 0x4D4D  # the chunk that holds all others
 PACKAGE_3MF = re.compile(rb"3D/[^/\0]{1,200}\.model|3D/_rels/", re.IGNORECASE)
+PLY_START = re.compile(rb"(?:\xef\xbb\xbf)?ply[ \t]*+[\r\n]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
 # What XML has before its root; possessive for the same reason.
@@ -169,6 +168,8 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
     for magic, name in MAGIC:
         if head.startswith(magic):
             return _package(head, data, filename) if name == "zip" else name
+    if PLY_START.match(head):
+        return "ply"
     if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
         return "webp"
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):

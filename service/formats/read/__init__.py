@@ -4,9 +4,14 @@ gltf         glTF
 obj_mesh     OBJ: vertices and faces
 obj          OBJ files with materials and textures
 obj_lines    the lines of an OBJ text by keyword, in blocks
+obj_rows     their numbers: rows of vertices and the corners of faces
+obj_colors   colours of an OBJ file's vertices
 ply          PLY, text and binary
+ply_header   its elements, and what lies where
+ply_body     its data, element by element
 stl          STL, binary and text
 polygons     polygons -> triangles
+corners      vertices for the corners of faces
 raw_mesh     the result of a reader
 numbers      numbers in texts, also those that are none
 bad_elements  what is left out of a mesh, and how it is told

@@ -12,6 +12,7 @@ from service.formats.errors import ParseError
 from service.formats.read.raw_mesh import MAX_COORDINATE, Numbers, RawMesh
 
 Mask = npt.NDArray[np.bool_]
+NO_INDEX = -(1 << 31)  # what stands for an index that is no whole number
 Namer = Callable[[int], str]
 
 OF_VERTEX: dict[str, tuple[str, float, str]] = {
@@ -94,6 +95,8 @@ def whole_faces(
     start = int(counts[:first].sum())
     named = corners[start : start + int(counts[first])]
     lost = named[(named < 0) | (named >= len(vertices))]
+    if len(lost) and lost[0] == NO_INDEX:
+        return whole, f"{face(first)} has an index that is no whole number"
     if len(lost):
         return whole, f"{face(first)} names vertex {int(lost[0])}; there are {len(vertices)}"
     bad = int(named[~good[named]][0])

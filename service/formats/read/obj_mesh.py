@@ -12,6 +12,7 @@ import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.read.bad_elements import Mask, left_out
+from service.formats.read.corners import distinct
 from service.formats.read.obj_colors import VertexColors
 from service.formats.read.obj_lines import Block, Named, blocks
 from service.formats.read.obj_rows import NOWHERE, WIDTHS, BadRows, Faults, Ints, corners, vectors
@@ -24,7 +25,6 @@ NAMES = {
     "vn": ("normal", "normals"),
 }
 INSTEAD = {"vt": "0 0 is used instead", "vn": "a computed one is used instead"}
-SHARES = 8
 MOST_NAMED = 1 << 20
 MOST_KEYWORDS, OTHERS = 20, "…"  # different statements that are told as not read, and what stands for all others
 
@@ -284,7 +284,7 @@ def _joined(found: Found) -> RawMesh:
     if colors is not None:
         rows["colors"] = colors
     if not alike:
-        first, joined = _distinct(corner, len(vertices), [(place, len(tables[k])) for k, place in used.items()])
+        first, joined = distinct(corner, len(vertices), [(place, len(tables[k])) for k, place in used.items()])
         places = {"v": corner, "colors": corner, **used}
         rows = {k: table[places[k][first]] for k, table in rows.items()}
         corner = joined
@@ -293,25 +293,3 @@ def _joined(found: Found) -> RawMesh:
     return RawMesh(
         rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings, groups=groups
     )
-
-
-def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[Longs, Ints]:
-    """(the first corner of each distinct set of indices, in their order; the number of each corner's set).
-
-    `others`: indices from -1 on, and how many rows they count in. A share of the vertices at a time: sorting all
-    corners of a million triangles at once takes a quarter of a gigabyte.
-    """
-    firsts, joined, count = [], np.empty(len(corner), np.int32), 0
-    step = max(have // SHARES, 1)
-    for low in range(0, have, step):
-        these = np.flatnonzero((corner >= low) & (corner < low + step))
-        mixed = corner[these].astype(np.int64)
-        for number, (place, rows) in enumerate(others):
-            mixed = mixed * (rows + 1) + (place[these] + 1)
-            if number < len(others) - 1:  # three indices of 31 bits don't fit into 64: two at a time
-                mixed = np.unique(mixed, return_inverse=True)[1]
-        _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
-        firsts.append(these[first])
-        joined[these] = inverse + count
-        count += len(first)
-    return np.concatenate(firsts), joined

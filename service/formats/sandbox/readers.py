@@ -17,7 +17,7 @@ from service.formats.read.bad_elements import mend
 from service.formats.read.materialx.importer import ALONE, SUFFIX, read_materialx
 from service.formats.read.mesh_checks import mesh_oddities
 from service.formats.read.obj.archive import Archive
-from service.formats.read.obj.importer import read_obj_scene
+from service.formats.read.obj.importer import holds_ply, read_obj_scene, read_ply_scene
 from service.formats.read.raw_mesh import Numbers, RawMesh, unit_colors, unit_normals
 from service.formats.read.stl import read_stl
 from service.formats.read.texture_sets.importer import read_texture_sets
@@ -70,9 +70,9 @@ def _mtlx(data: memoryview, limits: AssetLimits) -> RawMesh:
 
 
 def _zip(data: memoryview, limits: AssetLimits) -> RawMesh:
-    from service.formats.read.obj.importer import read_zipped_obj
+    from service.formats.read.obj.importer import read_zipped_mesh
 
-    return read_zipped_obj(data, limits)
+    return read_zipped_mesh(data, limits)
 
 
 def read_usd_scene(data: memoryview, limits: AssetLimits) -> SceneFile:
@@ -109,6 +109,8 @@ def parse_zip(data: memoryview, limits: AssetLimits) -> SceneFile:
                 return read_texture_sets(archive, limits)  # its names may say as much
             except ParseError:
                 raise missing from None
+    if holds_ply(archive):
+        return read_ply_scene(archive, limits)
     return read_texture_sets(archive, limits)
 
 

@@ -90,8 +90,8 @@ REFUSED: dict[str, tuple[str, bytes, str]] = {
     "PLY text cut": ("m.ply", make.ply(QUAD, [[0, 1, 2]], "a")[:-3], "cut off"),
     "PLY index out of range": (
         "m.ply",
-        make.ply(QUAD, [[0, 1, 2], [0, 1, 4]]),
-        "face 1 .* names vertex 4; there are 4",
+        make.ply(QUAD, [[0, 1, 4], [0, 1, 2, -9]]),
+        "none of its 2 faces can be used; face 0 .* names vertex 4; there are 4",
     ),
     "PLY of a line": ("m.ply", make.ply(QUAD, [[0, 1]]), "face 0 .* has 2 corners"),
     "PLY with nan": ("m.ply", make.ply(QUAD * np.float32("nan"), [[0, 1, 2]]), "vertex 0 .* not finite"),

@@ -1,4 +1,5 @@
-"""A zip with an OBJ file, its material libraries and textures as a scene document with meshes and images as parts.
+"""A zip with an OBJ file, its material libraries and textures, or with a PLY file and its textures, as a document
+whose meshes and images are parts.
 
 Each material's triangles become a mesh of their own. Coordinates stay as they are, and nothing else is merged or
 reordered.
@@ -18,11 +19,12 @@ from service.formats.formats import text
 from service.formats.read.bad_elements import mend
 from service.formats.read.obj.archive import Archive
 from service.formats.read.obj.materials import Materials
-from service.formats.read.obj.mtl import MtlMaterial, read_mtl
+from service.formats.read.obj.mtl import Map, MtlMaterial, read_mtl
 from service.formats.read.obj.paths import library_names, located
 from service.formats.read.obj.textures import Textures
 from service.formats.read.obj_lines import Named
 from service.formats.read.obj_mesh import MaterialMesh, read_obj, read_obj_with_materials
+from service.formats.read.ply import read_ply, read_textured_ply
 from service.formats.read.polygons import Longs
 from service.formats.read.raw_mesh import RawMesh
 from service.formats.read.scenes.framing import framed
@@ -33,22 +35,49 @@ from service.formats.read.scenes.room import stand_inside
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.types import AssetLimits, SceneFile
 
+OBJ, PLY = ".obj", ".ply"
 MOST_MATERIALS = 10_000  # materials that faces use
 MOST_LIBRARIES = 1_000
 
 
 def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     """The scene of a zipped OBJ file. Raises ParseError."""
-    archive = Archive(data, limits.max_file)
+    archive, notes = Archive(data, limits.max_file), Warnings()
     path = _model(archive)
     read = read_obj_with_materials(text(archive.read(path)))
+    library = _library(path, read.libraries, archive, notes)
+    return _scene(path, read, library, archive, notes, limits)
+
+
+def read_ply_scene(archive: Archive, limits: AssetLimits) -> SceneFile:
+    """The scene of a zipped PLY file, whose comments name its textures. Raises ParseError."""
+    path = _model(archive, PLY)
+    found = read_textured_ply(memoryview(archive.read(path)))
+    place = path.rpartition("/")[2]
+    numbers: dict[str, int] = {"": 0}  # of the materials: one for each texture, called by its name
+    of_texture = [numbers.setdefault(name, len(numbers)) for name in found.textures]
+    maps = {name: {"map_kd": Map(place, path, name)} for name in numbers if name}
+    library = {name: MtlMaterial(name, place, maps=each, places={"map_kd": place}) for name, each in maps.items()}
+    of_triangle = np.array([*of_texture, 0], np.int32)[found.of_triangle]  # -1, none, is the last
+    return _scene(
+        path, MaterialMesh(found.mesh, list(numbers), of_triangle, []), library, archive, Warnings(), limits
+    )
+
+
+def _scene(
+    path: str,
+    read: MaterialMesh,
+    library: dict[str, MtlMaterial],
+    archive: Archive,
+    notes: Warnings,
+    limits: AssetLimits,
+) -> SceneFile:
     mesh = read.mesh
     mend(mesh, limits.max_triangles)
-    notes, files = Warnings(), PartFiles()
+    files = PartFiles()
     name = path.rpartition("/")[2]
     for warning in mesh.warnings:
         notes.add(name, warning)
-    library = _library(path, read.libraries, archive, notes)
     textures = Textures(archive, files, notes, limits)
     used = mesh.vertices[np.unique(mesh.faces)]
     bounds = used.min(axis=0), used.max(axis=0)
@@ -57,7 +86,7 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
         _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
         for worn, which in _by_material(read)
     ]
-    group = name[: -len(".obj")]
+    group = name[: -len(OBJ)]  # or of PLY, which is as long
     shapes = [{"name": f"{group}/{shape['material']}" if len(shapes) > 1 else group} | shape for shape in shapes]
     document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
     if textures.documents:
@@ -73,10 +102,16 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     return SceneFile(document, files.parts, notes.document(), len(mesh.faces), False, bounds=corners)
 
 
-def read_zipped_obj(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
-    """The triangles of the OBJ file in a zip as one mesh, without its materials. Raises ParseError."""
+def read_zipped_mesh(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
+    """The triangles of the OBJ or PLY file in a zip as one mesh, without its materials. Raises ParseError."""
     archive = Archive(data, limits.max_file)
+    if not any(name.lower().endswith(OBJ) for name in archive.names) and holds_ply(archive):
+        return read_ply(memoryview(archive.read(_model(archive, PLY))))
     return read_obj(text(archive.read(_model(archive))))
+
+
+def holds_ply(archive: Archive) -> bool:
+    return any(name.lower().endswith(PLY) for name in archive.names)
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:
@@ -88,12 +123,13 @@ def zipped(files: Mapping[str, bytes]) -> bytes:
     return out.getvalue()
 
 
-def _model(archive: Archive) -> str:
-    """The path of the only OBJ file."""
-    found = [name for name in archive.names if name.lower().endswith(".obj")]
+def _model(archive: Archive, ending: str = OBJ) -> str:
+    """The path of the only file with this ending."""
+    found = [name for name in archive.names if name.lower().endswith(ending)]
     if len(found) != 1:
+        kind = ending[1:].upper()
         named = ", ".join(repr(name[:60]) for name in found[:3])
-        what = f"holds {len(found)} OBJ files, {named}" if found else "holds no OBJ file"
+        what = f"holds {len(found)} {kind} files, {named}" if found else f"holds no {kind} file"
         raise ParseError(f"the zip {what}; one is needed, with its materials and textures")
     return found[0]
 
