@@ -15,7 +15,10 @@ from service.formats.read.numbers import parsed
 from service.formats.read.ply_header import Element, Header, count_of
 from service.formats.read.polygons import Longs
 
-CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+CODES = {
+    **{"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q"},
+    **{"f4": "f", "f8": "d"},
+}
 
 Column = npt.NDArray[Any]
 Columns = dict[str, Column]
@@ -36,7 +39,7 @@ class Body:
         self.at = header.start
         self.unit = "byte"
         if header.encoding == "ascii":
-            self.data, self.at, self.unit = parsed(bytes(data[header.start :])).tobytes(), 0, "word"
+            self.data, self.at, self.unit = parsed(_without_end(bytes(data[header.start :]))).tobytes(), 0, "word"
             for p in (p for element in header.elements for p in element.properties):
                 p.dtype, p.count = "<f8", p.count and "<f8"
 
@@ -125,3 +128,8 @@ class Body:
                 f"the file is cut off: {element.length} rows of element {element.name} are promised, "
                 f"{len(self.data) - self.at} bytes are left"
             )
+
+
+def _without_end(text: bytes) -> bytes:
+    """The text without the bytes that mark its end, and no more."""
+    return text.rstrip(b"\0\x1a \t\r\n")

@@ -13,6 +13,7 @@ from service.formats.errors import ParseError
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"int64": "i8", "uint64": "u8"},  # which are none of the format's own, and are written all the same
     **{"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
 }
 HEADER_BYTES = 1 << 20

@@ -59,7 +59,9 @@ def test_a_strip_without_triangles_is_refused() -> None:
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("name", ["vertex_indices", "vertex_index", "indices"])
-@pytest.mark.parametrize("kinds", ["uchar int", "uint8 uint32", "int int", "uint16 int16", "float64 float"])
+@pytest.mark.parametrize(
+    "kinds", ["uchar int", "uint8 uint32", "int int", "uint16 int16", "float64 float", "uchar int64"]
+)
 def test_types_names_and_line_ends(ending: str, name: str, kinds: str) -> None:
     lines = ("element face 2", "property float32 quality", f"property list {kinds} {name}", "property uint8 flags")
     text = header(*lines, vertex="float64") + BODY + "0.5 3 0 1 2 7\n0.25 4 1 3 4 2 7\n"
@@ -303,3 +305,19 @@ def test_what_is_not_read_is_told() -> None:
 def test_headers_that_do_not_describe_the_data_are_refused(old: str, new: str, reason: str) -> None:
     with pytest.raises(ParseError, match=reason):
         parsed(PLAIN.replace(old, new, 1).encode())
+
+
+def test_indices_of_eight_bytes() -> None:
+    """Which the format does not have, and libraries write that take an array as it is."""
+    lines = ("element face 2", "property list uchar int64 vertex_indices")
+    rows = ((3, 0, 1, 2), (4, 1, 3, 4, 2))
+    body = np.array(VERTICES, "<f4").tobytes() + b"".join(struct.pack(f"<B{len(row) - 1}q", *row) for row in rows)
+    mesh = parsed(header(*lines, format="binary_little_endian").encode() + body)
+    assert len(mesh.faces) == 3 and not mesh.warnings
+
+
+@pytest.mark.parametrize("end", ["", "\n\n", "\0", "\n \0\x1a", "\x1a"])
+def test_the_end_of_a_text_is_no_data(end: str) -> None:
+    text = header("element face 1", "property list uchar int vertex_indices") + BODY + "3 0 1 2\n"
+    mesh = parsed((text + end).encode())
+    assert mesh.faces.tolist() == [[0, 1, 2]] and not mesh.warnings
