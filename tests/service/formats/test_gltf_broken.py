@@ -119,7 +119,7 @@ def test_a_bad_position_names_its_item_and_accessor() -> None:
     file.node(mesh=file.mesh(file.primitive({"POSITION": rows}, np.array([0, 2, 3], "<u2"))))
     found = refusal(file.glb())
     assert found.pointer == "/meshes/0/primitives/0/attributes/POSITION"
-    assert found.detail.startswith("item 2 of /accessors/0 is not finite or lies beyond 1e9 m: [1.0, nan")
+    assert "item 2 of /accessors/0 is not finite or lies beyond 1e9 m: [1.0, nan" in found.detail
 
 
 def test_a_required_extension_that_a_still_does_not_show() -> None:

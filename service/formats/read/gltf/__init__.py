@@ -13,6 +13,7 @@ draco                 meshes that are compressed with KHR_draco_mesh_compression
 meshopt_views         buffer views that are compressed with EXT_ or KHR_meshopt_compression
 nodes                 nodes and their transforms
 primitives            primitives -> triangles with normals, colours and texture coordinates
+bad_rows              what of a primitive is left out
 deform                morph targets and skins, in the pose of the nodes
 animations            the pose of the nodes at one time of an animation
 variants              KHR_materials_variants

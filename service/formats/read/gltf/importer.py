@@ -9,15 +9,15 @@ import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.read.gltf import animations, lights_and_camera, variants
+from service.formats.read.gltf.bad_rows import usable
 from service.formats.read.gltf.deform import Skin, morphed, weights
-from service.formats.read.gltf.document import Array, GltfDocument
+from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.extensions import note_unsupported
 from service.formats.read.gltf.json_view import JsonView, whole
 from service.formats.read.gltf.materials import Materials
 from service.formats.read.gltf.nodes import Node, Nodes, instances
 from service.formats.read.gltf.primitives import Primitive, exporter_notes, read_primitive
 from service.formats.read.gltf.textures import Textures
-from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes import metering
 from service.formats.read.scenes.framing import framed
 from service.formats.read.scenes.names import LONGEST
@@ -142,15 +142,11 @@ class _Importer:
             colors = colors[:, :3]
         return replace(primitive, tangents=primitive.tangents if directed else None, colors=colors)
 
-    def _write(self, primitive: Primitive, place: JsonView) -> Part:
+    def _write(self, whole: Primitive, place: JsonView) -> Part | None:
+        primitive = usable(whole, place, self.notes)
+        if primitive is None:
+            return None
         vertices = primitive.vertices
-        bad = np.flatnonzero(~(np.abs(vertices) <= MAX_COORDINATE).all(axis=1))  # true for NaN, too
-        if len(bad):
-            raise _wrong(primitive, place, "POSITION", vertices, bad[0], "is not finite or lies beyond 1e9 m")
-        for name, rows in primitive.detail():
-            if not np.isfinite(rows).all():
-                bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-                raise _wrong(primitive, place, name, rows, bad[0], "is not finite")
         charts = [None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]]) for uv in primitive.uvs]
         data = ply(vertices, primitive.faces, primitive.normals, charts, primitive.colors, primitive.tangents)
         reference = self.files.add_mesh(data, place.pointer, vertices, len(primitive.faces))
@@ -194,12 +190,3 @@ def _named(node: Node, mesh: JsonView) -> str:
     if not node.path:
         return mesh_name
     return f"{node.path}/{mesh_name or 'Mesh'}" if node.place.array("children") else node.path
-
-
-def _wrong(primitive: Primitive, place: JsonView, name: str, rows: Array, row: int, what: str) -> ParseError:
-    """The refusal of a primitive for a row of its attribute `name`."""
-    attributes = place.need("attributes")
-    item = int(row if primitive.numbers is None else primitive.numbers[row])
-    accessor = attributes.value.get(name)
-    named = f"item {item} of /accessors/{accessor}" if type(accessor) is int else f"item {item}"
-    return attributes.error(name, f"{named} {what}: {rows[row].tolist()}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from service.formats.errors import ParseError
+from service.formats.read.gltf.bad_rows import usable
 from service.formats.read.gltf.deform import Skin, morphed, weights
 from service.formats.read.gltf.document import Array, GltfDocument
 from service.formats.read.gltf.nodes import Nodes, instances
@@ -30,7 +31,9 @@ def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
             primitive = read[place.pointer]
             if primitive is None:
                 continue
-            primitive = morphed(file, primitive, place, morph) if morph else primitive
+            primitive = usable(morphed(file, primitive, place, morph) if morph else primitive, place, notes)
+            if primitive is None:
+                continue
             for world in [np.eye(4)] if skin else instances(file, node):
                 triangles += len(primitive.faces)
                 if triangles > limits.max_triangles:  # before the memory is taken: one mesh may stand in many nodes

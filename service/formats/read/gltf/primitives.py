@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from service.formats.read.bad_elements import left_out
 from service.formats.read.gltf import accessors, draco
 from service.formats.read.gltf.document import Array, GltfDocument
 from service.formats.read.gltf.json_view import JsonView
@@ -80,7 +81,7 @@ class Primitive:
             tangents=some(self.tangents),
             joints=tuple(rows[used] for rows in self.joints),
             weights=tuple(rows[used] for rows in self.weights),
-            numbers=np.flatnonzero(used),
+            numbers=np.flatnonzero(used) if self.numbers is None else self.numbers[used],
         )
 
 
@@ -190,13 +191,22 @@ def _unit(rows: Array) -> Floats:
 
 
 def _triangles(mode: int, indices: Longs, vertices: int, place: JsonView, notes: Warnings) -> Longs:
-    if len(indices) and not 0 <= indices.min() <= indices.max() < vertices:
-        raise place.error("indices", f"refer to vertex {indices.max()}; there are {vertices}")
+    """(m, 3) the triangles whose vertices exist."""
     k = np.arange(max(len(indices) - 2, 0))
     if mode == STRIP:
-        return indices[np.stack([k, k + 1 + k % 2, k + 2 - k % 2], axis=1)]
-    if mode == FAN:
-        return indices[np.stack([k + 1, k + 2, 0 * k], axis=1)]
-    if len(indices) % 3:
-        notes.add(place.pointer, f"{len(indices)} indices do not make whole triangles; the last ones are left out")
-    return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+        found = indices[np.stack([k, k + 1 + k % 2, k + 2 - k % 2], axis=1)]
+    elif mode == FAN:
+        found = indices[np.stack([k + 1, k + 2, 0 * k], axis=1)]
+    else:
+        if len(indices) % 3:
+            notes.add(
+                place.pointer, f"{len(indices)} indices do not make whole triangles; the last ones are left out"
+            )
+        found = indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    beyond = (found < 0) | (found >= vertices)
+    if not beyond.any():
+        return found
+    lost = beyond.any(axis=1)
+    reason = f"refer to vertex {found[beyond][0]}; there are {vertices}"
+    notes.leave_out(place.at("indices"), left_out(int(lost.sum()), "triangle", reason))
+    return found[~lost]
