@@ -11,8 +11,11 @@ import pytest
 from gpu import layout
 from gpu.kernels.features import counts, flags
 from gpu.layout import LightKind, ShapeBit, ShapeKind
+from service.document import parse_scene
 from service.pack.lights import light_bounds, lights
-from tests.documents import GREY, LAMP, Shelf, box, matrix_of, mesh, packed, picture, quad, sphere
+from service.pack.textured_emission import nearest
+from service.pack.textures.words import pack_textures
+from tests.documents import GREY, LAMP, Shelf, box, document, matrix_of, mesh, packed, picture, quad, sphere
 
 MANY = {
     ShapeKind.SPHERE: ("spheres", 8, lambda i: sphere(center=[3 * i, 0, 0])),
@@ -343,3 +346,20 @@ def test_the_first_lamps_find_the_builder_warm():
     done = subprocess.run([sys.executable, "-c", WARMED], capture_output=True, text=True, check=True)
     warm, after = map(int, done.stdout.split())
     assert warm == after > 0
+
+
+@pytest.mark.parametrize("wrap", [["clamp", "repeat"], ["mirror", "clamp"], ["repeat", "mirror"]])
+def test_the_light_of_an_image_is_that_of_the_texel_that_each_axis_wraps_to(wrap):
+    """Of places in the middle of texels, by which textured lamps are weighed."""
+    pixels = np.random.default_rng(4).random((3, 4, 3)).astype(np.float32)
+    scene = parse_scene(document(quad(material="m"), materials={"m": {**GREY, "emission": {"texture": "t"}}},
+                                 textures={"t": {"asset": "sha256:t", "wrap": wrap}}))  # fmt: skip
+    _, uses, texels, _ = pack_textures(scene, scene, Shelf(t=picture(pixels)), None, None)
+    places = [(x, y) for x in range(-8, 12) for y in range(-6, 9)]
+    found = nearest(uses[0], texels, np.array([((x + 0.5) / 4, (y + 0.5) / 3) for x, y in places]))
+    index = {
+        "clamp": lambda i, n: min(max(i, 0), n - 1), "repeat": lambda i, n: i % n,
+        "mirror": lambda i, n: min(i % (2 * n), 2 * n - 1 - i % (2 * n)),
+    }  # fmt: skip
+    for (x, y), texel in zip(places, found, strict=True):
+        assert (texel == pixels[2 - index[wrap[1]](y, 3), index[wrap[0]](x, 4)]).all(), (x, y)
