@@ -189,7 +189,8 @@ def _stretch(s: Inputs) -> None:
         s.put("roughness", "roughness", raised(times(along, alpha), 0.25))
         parts.stretched(s, "anisotropy_strength", quotient(alpha, along))
         return
-    s.note("anisotropy_strength", "under a texture, anisotropy stretches the highlight in both directions, not one")
+    detail = "under a texture, anisotropy stretches the highlight in both directions, not one"
+    s.note("anisotropy_strength", detail, ROUGHLY)
     most = float(s.most("anisotropy_strength")[0])  # whose square times the texture is near to the square of both
     s.put("anisotropic", "anisotropy_strength", times(strength, most))
 
