@@ -114,7 +114,8 @@ def scattering(medium: Medium) -> np.ndarray:
     """The rate at which light turns, 1/m per channel (3,)."""
     if medium.albedo is None:
         return np.array(medium.scattering)
-    return np.array(medium.extinction()) * single_scattering_albedo(np.array(medium.albedo), medium.g)
+    turned: np.ndarray = np.array(medium.extinction()) * single_scattering_albedo(np.array(medium.albedo), medium.g)
+    return turned
 
 
 def _fill(record: np.void, medium: Medium) -> None:
