@@ -19,6 +19,7 @@ from service.document.base import refusal
 LARGEST = 1e9  # coordinates and lengths: their products stay well inside float32
 BRIGHTEST = 1e20  # radiometric values: a product with any throughput does as well
 Vec3 = tuple[float, float, float]
+ZERO: Vec3 = (0.0, 0.0, 0.0)
 LARGEST_INDEX = 2**31 - 1
 WORDS = {2: "two", 3: "three", 4: "four"}
 

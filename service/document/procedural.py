@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag
 
 from service.document.base import Model, entry, hint, picker, slider
 from service.document.color import Radiometric
-from service.document.numbers import Coordinate, Fraction, Point
+from service.document.numbers import ZERO, Coordinate, Fraction, Point
 
 Channel = Literal["r", "g", "b", "a"]
 MOST_STOPS = 16
@@ -26,11 +26,7 @@ class NoiseTexture(Model):
     """
 
     type: Literal["noise"]
-    a: Annotated[Radiometric, picker("First", "The colour or value where the noise is lowest.", soft=1)] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    a: Annotated[Radiometric, picker("First", "The colour or value where the noise is lowest.", soft=1)] = ZERO
     b: Annotated[Radiometric, picker("Second", "The colour or value where it is highest.", soft=1)] = (1.0, 1.0, 1.0)
     space: Annotated[
         Literal["object", "uv"],
@@ -45,9 +41,7 @@ class NoiseTexture(Model):
             unit="",
         ),
     ] = (4.0, 4.0, 4.0)
-    offset: Annotated[Point, entry("Offset", "Moves the pattern, in cells.", unit="")] = (
-        0.0, 0.0, 0.0,
-    )  # fmt: skip
+    offset: Annotated[Point, entry("Offset", "Moves the pattern, in cells.", unit="")] = ZERO
     octaves: Annotated[
         int, Field(ge=1, le=10), slider("Octaves", "How many layers of finer detail there are. Each costs time.")
     ] = 4

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Discriminator, PlainValidator, Tag, WithJsonSchema
 
 from service.document.base import Model, dial, entry, refusal
-from service.document.numbers import LARGEST, Point, ScaleFactors, check_number, described, vector_schema
+from service.document.numbers import LARGEST, ZERO, Point, ScaleFactors, check_number, described, vector_schema
 
 # The volume that the axes span once each has length one. Below it the inverse has no digit right in float32.
 LEAST_VOLUME = 1e-7
@@ -21,16 +21,8 @@ Matrix = tuple[float, ...]
 class Transform(Model):
     """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
 
-    translate: Annotated[Point, entry("Move", "Moves the thing along X, Y and Z.")] = (
-        0.0,
-        0.0,
-        0.0,
-    )
-    rotate: Annotated[Point, dial("Rotate", "Turns the thing about X, then Y, then Z.", soft=(-180, 180))] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    translate: Annotated[Point, entry("Move", "Moves the thing along X, Y and Z.")] = ZERO
+    rotate: Annotated[Point, dial("Rotate", "Turns the thing about X, then Y, then Z.", soft=(-180, 180))] = ZERO
     scale: Annotated[
         ScaleFactors,
         entry(
