@@ -7,19 +7,8 @@ from pydantic import BaseModel, Field
 from service.server.requests.compare_request import CONFIDENCE
 from service.server.routes.answers import RENDER_SCHEMA, body
 from service.server.routes.examples import COMPARISON
-
-
-class Region(BaseModel):
-    x: int = Field(description="Pixels from the left.")
-    y: int = Field(description="Pixels from the top.")
-    width: int
-    height: int
-    p_value: float
-
-
-class Differing(BaseModel):
-    share: float = Field(description="Of the pixels, those that are known to differ: 0 to 1.")
-    difference: float = Field(description="The mean of their differences as displayed, noise included: 0 to 1.")
+from service.server.verdict.figures import Differing
+from service.server.verdict.regions import Region
 
 
 class UnderWay(BaseModel):

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from service.colorimetry import LUMINANCE, decode_srgb, encode_srgb
 from service.server.verdict.evidence import Array
@@ -26,11 +28,11 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Differing:
-    """The pixels that are known to differ."""
-
-    share: float  # of all pixels
-    difference: float  # the mean of theirs, of 0 to 1 as displayed, whatever its sign
+class Differing:  # the pixels that are known to differ
+    share: Annotated[float, Field(description="Of the pixels, those that are known to differ: 0 to 1.")]
+    difference: Annotated[
+        float, Field(description="The mean of their differences as displayed, noise included: 0 to 1.")
+    ]
 
 
 def displayed(radiance: Array) -> Array:

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from service.colorimetry import LUMINANCE
 from service.server.verdict.decision import Level
@@ -24,11 +26,9 @@ Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Region:
-    """Pixels from the top left."""
-
-    x: int
-    y: int
+class Region:  # in pixels
+    x: Annotated[int, Field(description="Pixels from the left.")]
+    y: Annotated[int, Field(description="Pixels from the top.")]
     width: int
     height: int
     p_value: float
