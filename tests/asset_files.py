@@ -178,8 +178,13 @@ def read_png(data: bytes) -> np.ndarray:
     return bytes_.reshape(-1).view(f">u{bits // 8}").reshape(h, w, c)
 
 
-def exr(pixels: np.ndarray, window: tuple[int, int, int, int] | None = None) -> bytes:
-    """Float, uncompressed, channels R G B; the data window may lie or lie elsewhere in the display window."""
+def exr(
+    pixels: np.ndarray,
+    window: tuple[int, int, int, int] | None = None,
+    more: tuple[tuple[bytes, bytes, bytes], ...] = (),
+) -> bytes:
+    """Float, uncompressed, channels R G B; the data window may lie or lie elsewhere in the display window. `more` are
+    attributes: name, type and value."""
     h, w, _ = pixels.shape
     left, top, right, bottom = window or (0, 0, w - 1, h - 1)
     channels = b"".join(n + b"\0" + struct.pack("<IBBBBII", 2, 0, 0, 0, 0, 1, 1) for n in (b"B", b"G", b"R")) + b"\0"
@@ -194,6 +199,7 @@ def exr(pixels: np.ndarray, window: tuple[int, int, int, int] | None = None) -> 
             (b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
             (b"screenWindowCenter", b"v2f", struct.pack("<ff", 0, 0)),
             (b"screenWindowWidth", b"float", struct.pack("<f", 1)),
+            *more,
         )
     )
     start = len(header) + 1 + 8 * h

@@ -144,7 +144,8 @@ def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
     warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
     if isinstance(parsed, ImageData):
         height, width, channels = parsed.pixels.shape
-        return AssetInfo(id, KINDS[format], format, size, width, height, channels, warnings=warnings)
+        layers = list(parsed.layers) or None
+        return AssetInfo(id, KINDS[format], format, size, width, height, channels, warnings=warnings, layers=layers)
     if isinstance(parsed, LutData | MeasuredData):
         return AssetInfo(id, KINDS[format], format, size, warnings=warnings)
     bounds = [corner.tolist() for corner in parsed.bounds]

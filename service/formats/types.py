@@ -69,6 +69,7 @@ class ImageData:
 
     pixels: npt.NDArray[np.float32] | npt.NDArray[np.uint8]  # (height, width, 1 | 3 | 4), finite; 16 bits became 0..1
     warnings: tuple[str, ...] = ()  # about statements in the file that are ignored
+    layers: tuple[str, ...] = ()  # the names of an EXR's layers, where it has several
 
     @property
     def is_8bit(self) -> bool:
@@ -200,6 +201,7 @@ class AssetInfo:
     aspect_ratio: float | None = None  # of the picture of a scene's camera, width over height
     variants: list[str] | None = None  # of a scene's materials, by name
     animations: list[dict[str, Any]] | None = None  # of a scene: [{name, duration}], s
+    layers: list[str] | None = None  # of an EXR with several, by name; "" is the one of plain R, G and B
 
 
 @dataclass(frozen=True)

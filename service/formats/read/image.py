@@ -13,6 +13,10 @@ import numpy.typing as npt
 
 from service.formats.errors import ParseError
 from service.formats.images.metadata import exr_attributes
+from service.formats.read.exr_cube import FORMAT as CUBE
+from service.formats.read.exr_cube import TOLD, latitude_longitude
+from service.formats.read.exr_layers import POINTER, check_sampling, choose
+from service.formats.read.hdr_lines import is_new, read_lines
 from service.formats.types import AssetLimits, Floats, ImageData
 
 PILLOW = {"png": "PNG", "jpeg": "JPEG", "webp": "WEBP"}
@@ -29,27 +33,29 @@ NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue and white
 PNG_END = b"IEND\xaeB`\x82"
 HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
-COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # names of channels, in lower case
-ALPHA = ("a", "alpha")
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of Rec.709's primaries
 ORIENTATION = 0x0112  # the EXIF tag
 SRGB_NAMES = (b"sRGB", "sRGB".encode("utf-16-be"))  # in the description of a profile
 SRGB_GAMMA = 1 / 2.2
 
 
-def parse_image(format: str, data: bytes, limits: AssetLimits) -> ImageData:
-    """Raises ParseError, or the libraries' exceptions."""
+def parse_image(format: str, data: bytes, limits: AssetLimits, layer: str = "") -> ImageData:
+    """The image in a file, of an EXR the layer of this name. Raises ParseError, or the libraries' exceptions."""
     if not data.startswith(SIGNATURES[format]):
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
+    if layer and format != "exr":
+        raise ParseError("belongs to EXR files; other images have no layers", POINTER)
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
     if is_8bit:
         texels, warnings = _pillow(format, data, limits)
         return ImageData(np.ascontiguousarray(texels), tuple(warnings))
-    pixels = _openimageio(format, data, limits)
-    ignored = tuple(_header(format, data))
+    read = _floats(format, data, limits, layer)
+    pixels = read.pixels
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
         raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
-    return ImageData(np.ascontiguousarray(pixels, np.float32), ignored)
+    told = (*_header(format, data), *read.warnings)
+    return ImageData(np.ascontiguousarray(pixels, np.float32), told, read.layers)
 
 
 def _header(format: str, data: bytes) -> Iterator[str]:
@@ -112,20 +118,37 @@ def _unfollowed(image: Any) -> Iterator[str]:
         yield f"its gamma ({image.info['gamma']:g}) is not followed: set the texture's color_space"
 
 
-def _openimageio(format: str, data: bytes, limits: AssetLimits) -> Floats:
+def _floats(format: str, data: bytes, limits: AssetLimits, layer: str) -> ImageData:
     """EXR and Radiance as stored; a PNG of 16 bits with straight alpha, which Pillow would round to 8."""
     _check_header(format, data, limits)
+    if format == "hdr" and (old := _old_lines(data)) is not None:
+        return ImageData(_upright(old, data))
     with _path(data) as path, _opened(format, path) as file:
-        part, names = _part(file)
+        choice = choose(file, layer)
         spec = file.spec()
+        _check_plain(spec)
         check_size(spec.width, spec.height, limits)
         check_size(spec.full_width, spec.full_height, limits)
+        names = choice.layer.channels
         first, last = min(names), max(names) + 1
-        pixels = file.read_image(part, 0, first, last, "float")
+        pixels = file.read_image(choice.layer.part, 0, first, last, "float")
         if pixels is None:
             raise ParseError(_said(file.geterror(), path))
+        is_cube = spec.get_string_attribute("textureformat") == CUBE
         picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
-        return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
+    picked = _rgb(picked) if choice.layer.is_chroma else picked
+    if is_cube:
+        return ImageData(latitude_longitude(picked, limits), (*choice.warnings, TOLD), choice.names)
+    framed = _framed(picked, spec)
+    return ImageData(_upright(framed, data) if format == "hdr" else framed, choice.warnings, choice.names)
+
+
+def _old_lines(data: bytes) -> Floats | None:
+    """The texels of a Radiance file with flat lines or the older run lengths; None for one with the newer."""
+    size = HDR_SIZE.search(data[:65536])
+    if size is None or is_new(data, size.end(), int(size[5])):
+        return None
+    return read_lines(data, size.end(), int(size[3]), int(size[5]))
 
 
 @contextmanager
@@ -173,49 +196,26 @@ def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
         check_size(int(header[5]), int(header[3]), limits)
     elif format == "exr":
         attributes = exr_attributes(data)
+        check_sampling(attributes)
         for window in (attributes.get("dataWindow", b""), attributes.get("displayWindow", b"")):
             if len(window) == 16:
                 left, top, right, bottom = struct.unpack("<iiii", window)
                 check_size(right - left + 1, bottom - top + 1, limits)
 
 
-def _part(file: Any) -> tuple[int, list[int]]:
-    """The first part with a colour image, or else a grey one, and the places of its channels: RGB, RGBA or one."""
-    seen: list[str] = []
-    grey: tuple[int, list[int]] | None = None
-    part = 0
-    while file.seek_subimage(part, 0):
-        names = list(file.spec().channelnames)
-        found = _colored(names)
-        if found:
-            return _plain(file.spec(), part, found)
-        if grey is None and (len(names) == 1 or names == ["Y", "A"]):
-            grey = part, [0] if len(names) == 1 else [0, 0, 0, 1]
-        seen += names
-        part += 1
-    if grey is not None and file.seek_subimage(grey[0], 0):
-        return _plain(file.spec(), *grey)
-    raise ParseError(f"it has no channels R, G and B; it has {', '.join(seen[:20])}")
-
-
-def _colored(names: list[str]) -> list[int]:
-    """The places of red, green, blue and perhaps alpha, of the first layer that has them; [] without any."""
-    places = {name.lower(): k for k, name in reversed(list(enumerate(names)))}
-    for layer in dict.fromkeys(["", *(name.rpartition(".")[0].lower() + "." for name in names if "." in name)]):
-        for colour in COLOUR:
-            wanted = [layer + name for name in colour]
-            if all(name in places for name in wanted):
-                alpha = [layer + name for name in ALPHA if layer + name in places][:1]
-                return [places[name] for name in wanted + alpha]
-    return []
-
-
-def _plain(spec: Any, part: int, channels: list[int]) -> tuple[int, list[int]]:
+def _check_plain(spec: Any) -> None:
     if spec.deep:
         raise ParseError("deep images are not supported")
     if spec.depth > 1:
         raise ParseError("images with depth are not supported")
-    return part, channels
+
+
+def _rgb(pixels: Floats) -> Floats:
+    """Red, green and blue, and alpha where there is one, from luminance and chroma: RY is R / Y - 1, BY B / Y - 1."""
+    y = pixels[..., :1]
+    red, blue = (pixels[..., 1:2] + 1) * y, (pixels[..., 2:3] + 1) * y
+    green = (y - LUMINANCE[0] * red - LUMINANCE[2] * blue) / LUMINANCE[1]
+    return np.concatenate([red, green, blue, pixels[..., 3:]], axis=2).astype(np.float32)
 
 
 def _framed(pixels: npt.NDArray[Any], spec: Any) -> Floats:

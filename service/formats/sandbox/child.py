@@ -137,7 +137,7 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
         tables, facts = transfer.sent(parsed)
         return {name: [table] for name, table in tables.items()}, facts
     if isinstance(parsed, ImageData):
-        return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
+        return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings), "layers": list(parsed.layers)}
     arrays: dict[str, Pieces] = {
         name: [array] for name, array in vars(parsed).items() if isinstance(array, np.ndarray)
     }

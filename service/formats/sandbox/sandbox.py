@@ -217,7 +217,7 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
     finally:
         os.close(fd)
     if "pixels" in arrays:
-        return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
+        return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])), tuple(map(str, reply["layers"])))
     if "lut" in arrays:
         return lut_of(arrays["lut"], reply["low"], reply["high"])
     if "density" in arrays:

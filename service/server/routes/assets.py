@@ -76,6 +76,9 @@ class Asset(BaseModel):
     )
     variants: list[str] | None = Field(None, description="Of a scene: the variants of its materials, by name.")
     animations: list[AssetAnimation] | None = Field(None, description="Of a scene.")
+    layers: list[str] | None = Field(
+        None, description="Of an EXR with several: their names, which `layer` takes; an empty one is its R, G and B."
+    )
 
 
 class MaterialSet(BaseModel):

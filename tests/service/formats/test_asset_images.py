@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import tempfile
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from service.problems import AssetError
 from service.server.assets import AssetStore
 from tests import asset_files as make
 from tests.documents import Shelf, packed, sphere
+from tests.exr_files import saved, written, written_parts
 
 RNG = np.random.default_rng(11)
 PIXELS = RNG.random((8, 16, 3)).astype(np.float32)
@@ -225,39 +224,13 @@ def test_exr_of_several_parts_shows_the_coloured_one(store: AssetStore) -> None:
     depth, normal = ("depth", PIXELS[..., :1], ("Z",)), ("n", PIXELS, ("N.X", "N.Y", "N.Z"))
     for parts in ([depth, normal, ("rgb", PIXELS, "RGB")], [("rgb", PIXELS, "RGB"), depth]):
         assert np.array_equal(image_of(store, written_parts(parts))[0], PIXELS)
-    assert np.array_equal(image_of(store, written_parts([normal, depth]))[0], PIXELS[..., :1])
+    grey = ("grey", PIXELS[..., :1], ("Y",))
+    assert np.array_equal(image_of(store, written_parts([normal, depth, grey]))[0], PIXELS[..., :1])
+    with pytest.raises(AssetError, match=r"no channels R, G and B; it has N\.X, N\.Y, N\.Z, Z: data, not a picture"):
+        store.add(written_parts([normal, depth]))
 
 
 def test_exr_whose_windows_don_t_meet_is_refused(store: AssetStore) -> None:
     for window in ((100, 0, 115, 7), (-20, 0, -5, 7), (0, 8, 15, 15), (0, -8, 15, -1)):
         with pytest.raises(AssetError, match="data window lies outside of its display window"):
             store.add(make.exr(PIXELS, window))
-
-
-def written(pixels: np.ndarray, names: Sequence[str], dtype: str = "float", tile: int = 0) -> bytes:
-    """An EXR by OpenImageIO: for what our own writer of tests has not."""
-    return written_parts([("", pixels, names)], dtype, tile)
-
-
-def written_parts(parts: list[tuple[str, np.ndarray, Sequence[str]]], dtype: str = "float", tile: int = 0) -> bytes:
-    specs = []
-    for name, pixels, channels in parts:
-        height, width, count = pixels.shape
-        spec = oiio.ImageSpec(width, height, count, dtype)
-        spec.channelnames = list(channels)
-        spec.tile_width = spec.tile_height = tile
-        if name:
-            spec.attribute("oiio:subimagename", name)
-        specs.append(spec)
-    return saved(specs, [pixels for _, pixels, _ in parts])
-
-
-def saved(specs: list[oiio.ImageSpec], parts: list[np.ndarray]) -> bytes:
-    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
-        output = oiio.ImageOutput.create(file.name)
-        assert output.open(file.name, specs), output.geterror()
-        for k, pixels in enumerate(parts):
-            assert not k or output.open(file.name, specs[k], "AppendSubimage"), output.geterror()
-            assert output.write_image(np.ascontiguousarray(pixels)), output.geterror()
-        output.close()
-        return Path(file.name).read_bytes()
