@@ -141,7 +141,7 @@ def test_a_set_becomes_one_material(store: AssetStore, naming: str) -> None:
 )
 def test_the_last_word_decides(stem: str, material: str, roles: str) -> None:
     found = meaning(stem)
-    assert found is not None and not found.udim
+    assert found is not None and found.tile is None
     assert found.material == material and " ".join(found.channels) == roles
 
 
@@ -191,7 +191,7 @@ def test_materials_are_parted_by_what_their_names_share_and_what_is_not_taken_is
         "oak_height.png": make.png(GREY),
         "oak_normal_dx.png": make.png(BLUE),
         "oak_normal_gl.png": make.png(BLUE + 1),
-        "body_color.1001.png": make.png(COLOR + 3),
+        "body_color.1002.png": make.png(COLOR + 3),
         "readme.txt": b"CC0",
         "cover.png": make.png(COLOR + 4),
     }
@@ -199,8 +199,8 @@ def test_materials_are_parted_by_what_their_names_share_and_what_is_not_taken_is
     imported = store.materials(info.id)
     assert list(imported.document["materials"]) == ["oak", "stone", "wood"]
     notes = {note["pointer"]: note["detail"] for note in imported.warnings}
-    assert notes.keys() == {"oak_height.png", "oak_normal_dx.png", "body_color.1001.png", "readme.txt", "cover.png"}
-    assert "oak_normal_gl.png" in notes["oak_normal_dx.png"] and "UDIM" in notes["body_color.1001.png"]
+    assert notes.keys() == {"oak_height.png", "oak_normal_dx.png", "body_color.1002.png", "readme.txt", "cover.png"}
+    assert "oak_normal_gl.png" in notes["oak_normal_dx.png"] and "UDIM" in notes["body_color.1002.png"]
     assert "0.02 m from black to white are assumed" in notes["oak_height.png"]
     assert imported.document["materials"]["oak"]["height"]["scale"] == 0.02
 

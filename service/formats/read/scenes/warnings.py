@@ -9,12 +9,17 @@ from service.formats.errors import ParseError
 
 MOST = 200  # different warnings, as an untrusted file may cause any number
 LONGEST = 300  # characters of a pointer or a detail
+MOST_NAMED = 20  # places of one warning
 
 
 @dataclass
 class Warnings:
-    """Details in the order in which they were found, each with its first place and the number of its places."""
+    """Details in the order in which they were found, each with its first place and the number of its places.
 
+    Places that are names of files are named, too, where `names_files` is true.
+    """
+
+    names_files: bool = False
     _places: dict[str, set[str]] = field(default_factory=dict)  # by detail
     _first: dict[str, str] = field(default_factory=dict)
     _unlisted: int = 0
@@ -42,6 +47,10 @@ class Warnings:
         self.add(pointer, detail)
         self._omissions[detail[:LONGEST]] = None
 
+    def has(self, beginning: str) -> bool:
+        """True where a detail begins so."""
+        return any(detail.startswith(beginning) for detail in self._first)
+
     def nothing_left(self) -> ParseError:
         """The refusal of a file that has nothing to show, with the reasons."""
         found = [note for note in self.document() if note["detail"].startswith(tuple(self._omissions))]
@@ -55,8 +64,15 @@ class Warnings:
         listed: list[dict[str, Any]] = []
         for detail, pointer in self._first.items():
             count = len(self._places[detail])
-            more = f" (here and in {count - 1} more place{'s' if count > 2 else ''})" if count > 1 else ""
+            more = self._elsewhere(detail) if count > 1 else ""
             listed.append({"pointer": pointer, "detail": detail + more} | ({"count": count} if count > 1 else {}))
         if self._unlisted:
             listed.append({"pointer": "", "detail": f"there are {self._unlisted} more warnings"})
         return listed
+
+    def _elsewhere(self, detail: str) -> str:
+        others = sorted(self._places[detail] - {self._first[detail]})
+        if not self.names_files:
+            return f" (here and in {len(others)} more place{'s' if len(others) > 1 else ''})"
+        unnamed = len(others) - MOST_NAMED + 1
+        return f" (also {', '.join(others[: MOST_NAMED - 1])}{f' and {unnamed} more' if unnamed > 0 else ''})"

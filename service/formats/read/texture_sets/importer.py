@@ -14,9 +14,9 @@ from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.texture_sets.baking import inverted, turned
-from service.formats.read.texture_sets.names import Role
+from service.formats.read.texture_sets.names import FIRST_TILE, Role
 from service.formats.read.texture_sets.real_size import Size, by_names, by_note
-from service.formats.read.texture_sets.sets import RoleImage, TextureSet, texture_sets
+from service.formats.read.texture_sets.sets import UDIM, RoleImage, TextureSet, texture_sets
 from service.formats.types import AssetLimits, SceneFile
 
 MOST_MATERIALS = 1_000
@@ -34,15 +34,16 @@ CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
 def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
     """The materials of a zip, each a `principled`. Raises ParseError."""
-    notes, files = Warnings(), PartFiles()
+    notes, files = Warnings(names_files=True), PartFiles()
     note = by_note(archive)
     others = [path for path in archive.names if note is None or path != note[0]]
     images = {path: data for path in others if (data := _image(archive, path, notes)) is not None}
     sets = texture_sets(images, notes)
     if not sets:
+        tiles = f". {UDIM}, and it has none that is tile {FIRST_TILE}" if notes.has(UDIM) else ""
         raise ParseError(
             "the zip holds no OBJ file, and no images whose names say what they are, such as wood_color.png and "
-            "wood_normal.png"
+            f"wood_normal.png{tiles}"
         )
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")

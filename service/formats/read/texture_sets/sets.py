@@ -7,13 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.texture_sets.names import Meaning, Role, meaning
+from service.formats.read.texture_sets.names import FIRST_TILE, Meaning, Role, meaning, tiles_within
 
 # Things that no parameter has: they are left out, with a warning.
 LEFT_OUT: dict[Role, str] = {
     "occlusion": "ambient occlusion is left out: the light that reaches a corner is traced",
     "other": "there is no parameter for such an image; it is left out",
 }
+UDIM = "UDIM tiles are not supported"
 
 
 @dataclass(frozen=True)
@@ -34,17 +35,29 @@ class TextureSet:
 
 def texture_sets(paths: Iterable[str], notes: Warnings) -> dict[str, TextureSet]:
     """The sets by material, in the order of their names; paths lead to images. What is not taken is noted."""
+    stems = {path: posixpath.splitext(posixpath.basename(path))[0] for path in sorted(paths)}
+    tiled = tiles_within(stems.values())
     named: dict[str, list[tuple[str, Meaning]]] = {}
-    for path in sorted(paths):
-        found = meaning(posixpath.splitext(posixpath.basename(path))[0])
+    names: dict[str, str] = {}
+    for path, stem in stems.items():
+        found = meaning(stem, tiled)
         if found is None:
             notes.add(path, "the file's name does not say what the image is of; it is left out")
-        elif found.udim:
-            notes.add(path, "tiles (UDIM) are not supported; the image is left out")
+        elif found.tile is not None and found.tile != FIRST_TILE:
+            notes.add(path, f"{UDIM}; this one is left out")
         else:
-            named.setdefault(_material(path, found), []).append((path, found))
-    sets = {name: _chosen(images, notes) for name, images in named.items()}
+            if found.tile is not None:
+                notes.add(path, f"{UDIM}; tile {FIRST_TILE} is shown wherever the material is")
+            name = _material(path, found)
+            named.setdefault(key := _plain(name), []).append((path, found))
+            names.setdefault(key, name)
+    sets = {names[key]: _chosen(images, notes) for key, images in named.items()}
     return {name: each for name, each in sets.items() if each.sources}
+
+
+def _plain(name: str) -> str:
+    """A name without case and what parts its words, so that `Old Wood` and `old-wood` are one."""
+    return "".join(letter for letter in name.casefold() if letter.isalnum()) or name
 
 
 def _material(path: str, found: Meaning) -> str:
