@@ -32,7 +32,7 @@ class Shelf:
         self.known = {f"sha256:{name}": value for name, value in known.items()}
         self.fetched: list[str] = []
 
-    def _fetch(self, ref: str) -> MeshData | ImageData:
+    def _fetch(self, ref: str, layer: str = "") -> MeshData | ImageData:
         self.fetched.append(ref)
         if ref not in self.known:
             raise AssetError("is not uploaded")

@@ -21,7 +21,7 @@ class Images:
     def __init__(self, **images: np.ndarray) -> None:
         self._images = images
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         return ImageData(self._images[ref])
 
     def mesh(self, ref: str) -> Any:

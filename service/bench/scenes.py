@@ -59,12 +59,12 @@ class BenchAssets:
     def measured(self, ref: str) -> MeasuredData:
         return self._builtin.measured(ref)
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         if self._environment_file:
             return _beside(self._environment_file).image(self._environment_file.name)
         if ref == SOFT_SUN:
             return _soft_sun()
-        return self._builtin.image(ref)
+        return self._builtin.image(ref, layer)
 
 
 def _soft_sun(height: int = 256, width: float = 8.0) -> ImageData:

@@ -26,9 +26,9 @@ class SourceAssets:
         """Raises AssetError."""
         return self._found.mesh(self._where(ref))
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         """Raises AssetError."""
-        return self._found.image(self._where(ref))
+        return self._found.image(self._where(ref), layer)
 
     def measured(self, ref: str) -> MeasuredData:
         """Raises AssetError."""

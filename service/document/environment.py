@@ -10,6 +10,7 @@ from service.document.base import OMITTABLE, Model, dial, hint, picker, refusal,
 from service.document.medium import Medium
 from service.document.numbers import BRIGHTEST, Degrees, Factor, Fraction
 from service.document.photometry import Radiance
+from service.document.texture import Layer
 
 
 class _Surroundings(Model):
@@ -84,6 +85,7 @@ class ImageEnvironment(_Picture):
 
     type: Literal["image"]
     asset: Annotated[str, Field(min_length=1), hint("Image", "A panorama of all directions, as an EXR or HDR file.")]
+    layer: Layer = None
 
 
 class CubeFaces(Model):

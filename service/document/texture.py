@@ -72,6 +72,18 @@ Mapping = Annotated[
 ]
 
 
+def content_of(asset: str, layer: str | None) -> str:
+    """A key of a layer of an image."""
+    return asset if layer is None else f"{asset} {layer}"
+
+
+Layer = Annotated[
+    Annotated[str, Field(min_length=1, max_length=300)] | None,
+    OMITTABLE,
+    hint("Layer", "Of an EXR that has several, by its name; without it the picture itself."),
+]
+
+
 class ImageTexture(Model):
     """An image file; row 0 is v = 1, texel centres lie at (i + 0.5) / n."""
 
@@ -81,6 +93,7 @@ class ImageTexture(Model):
         OMITTABLE,
         hint("Colour space", "Without it 8-bit images in colours are sRGB, all others linear; alpha always is."),
     ] = None
+    layer: Layer = None
     wrap: Annotated[Wrap, hint("Wrap", "What lies outside of the image: one word, or one for u and one for v.")] = (
         "repeat"
     )
@@ -108,6 +121,11 @@ class ImageTexture(Model):
     def wraps(self) -> tuple[WrapMode, WrapMode]:
         """The modes along u and along v."""
         return (self.wrap, self.wrap) if isinstance(self.wrap, str) else self.wrap
+
+    @property
+    def content(self) -> str:
+        """A key that is equal where the same image is shown."""
+        return content_of(self.asset, self.layer)
 
     @model_validator(mode="after")
     def _reads_what_it_names(self) -> Self:

@@ -12,6 +12,7 @@ read          readers of single formats, and importers of whole scenes
 images        pixels -> files
 """
 
+from service.formats.errors import at_fault
 from service.formats.types import (
     AssetInfo,
     AssetLimits,
@@ -25,4 +26,5 @@ from service.formats.types import (
 
 __all__ = [
     "AssetInfo", "AssetLimits", "Assets", "ImageData", "LutData", "MeasuredData", "MeshData", "MeshOddities",
+    "at_fault",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Protocol
 
-from service.formats.errors import MissingExtra, ParseError
+from service.formats.errors import LAYER, MissingExtra, ParseError
 from service.formats.formats import KINDS
 from service.formats.sandbox.sandbox import Sandbox
 from service.formats.types import (
@@ -134,9 +134,14 @@ def as_lut(parsed: Parsed, name: str) -> LutData:
     return parsed
 
 
+def layered(key: str, layer: str) -> str:
+    """The key of a layer of an image."""
+    return f"{key} layer {layer}" if layer else key
+
+
 def refused(name: str, error: ParseError) -> AssetError | NotProvided:
     """The error for a caller whose file is not read."""
-    detail = f"{name}: {error}"
+    detail = f"{name}: {error.detail if error.pointer == LAYER else error}"
     return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
 
 

@@ -1,5 +1,7 @@
 """ParseError, the refusal of a file. This module imports nothing, so that the parsing child stays small."""
 
+LAYER = "/layer"  # the pointer where an image has no layer of a name
+
 
 class ParseError(Exception):
     """A file was refused; the message says to its author what is wrong and where.
@@ -15,3 +17,9 @@ class ParseError(Exception):
 
 class MissingExtra(ParseError):
     """A file was refused because the package that reads it is not installed; the message names the extra."""
+
+
+def at_fault(place: str, asset: str) -> str:
+    """The pointer to the field at fault, given the place that a refusal names in a file and the pointer to the asset:
+    this, or the one to the `layer` beside it."""
+    return asset.rpartition("/")[0] + LAYER if place == LAYER else asset

@@ -220,7 +220,7 @@ class _NoAssets:
     def mesh(self, ref: str) -> MeshData:
         raise AssetError("there are no assets here")
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         raise AssetError("there are no assets here")
 
     def measured(self, ref: str) -> MeasuredData:

@@ -44,9 +44,9 @@ def cases() -> list[Case]:
 class TradeoffAssets(BenchAssets):
     """The bench's, and textures."""
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         made = {PLANKS: planks, BUMPS: bumps}.get(ref)
-        return ImageData(made()) if made else super().image(ref)
+        return ImageData(made()) if made else super().image(ref, layer)
 
 
 def planks(size: int = 256) -> np.ndarray:

@@ -348,6 +348,8 @@ class ImageEnvironment(TypedDict, total=False):
     type: Required[Literal["image"]]
     asset: Required[str]
     """A panorama of all directions, as an EXR or HDR file."""
+    layer: str
+    """Of an EXR that has several, by its name; without it the picture itself."""
     rotation: float
     """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
     scale: float
@@ -365,6 +367,8 @@ class ImageTexture(TypedDict, total=False):
     """PNG, JPEG, WebP, EXR or Radiance HDR."""
     color_space: Literal["srgb", "linear"]
     """Without it 8-bit images in colours are sRGB, all others linear; alpha always is."""
+    layer: str
+    """Of an EXR that has several, by its name; without it the picture itself."""
     wrap: Literal["repeat", "clamp", "mirror"] | list[Literal["repeat", "clamp", "mirror"]]
     """What lies outside of the image: one word, or one for u and one for v. (default 'repeat')"""
     mapping: Literal["uv", "box", "sphere"]

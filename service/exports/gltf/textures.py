@@ -22,7 +22,7 @@ from service.exports.gltf import pixels
 from service.exports.gltf.builder import Builder, Tree
 from service.exports.losses import Losses
 from service.exports.writing import Files, Limits
-from service.formats import ImageData
+from service.formats import ImageData, at_fault
 from service.formats.formats import sniff
 from service.problems import AssetError, FieldError, InvalidDocument, TooLarge, escaped
 
@@ -95,13 +95,12 @@ class Textures:
     def _image(self, reference: Reference) -> ImageData:
         texture = self._texture(reference)
         try:
-            if texture.asset not in self._pixels:
-                self._pixels[texture.asset] = self.files.image(texture.asset)
-            return self._pixels[texture.asset]
+            if texture.content not in self._pixels:
+                self._pixels[texture.content] = self.files.image(texture.asset, texture.layer or "")
+            return self._pixels[texture.content]
         except AssetError as error:
-            raise InvalidDocument(
-                [FieldError(f"/textures/{escaped(reference.texture)}/asset", error.detail)]
-            ) from None
+            pointer = at_fault(error.place, f"/textures/{escaped(reference.texture)}/asset")
+            raise InvalidDocument([FieldError(pointer, error.detail)]) from None
 
     def _together(self, planes: Planes) -> Planes:
         """The planes without textures that cannot share an image with the first one: glTF reads them all from one."""
@@ -210,7 +209,7 @@ class Textures:
             return None if plane is None else plane.value
         texture = self._texture(plane.reference)
         if isinstance(texture, ImageTexture):
-            return texture.asset, plane.channel, self._is_srgb(plane.reference)
+            return texture.content, plane.channel, self._is_srgb(plane.reference)
         return texture.a, texture.b, plane.channel
 
     def _stored(self, plane: Plane, wants_srgb: bool) -> tuple[np.ndarray, bool]:

@@ -75,7 +75,7 @@ class Images:
         return self._paths[texture.asset]
 
     def is_8bit(self, texture: ImageTexture) -> bool:
-        return bool(self.files.image(texture.asset).is_8bit)
+        return bool(self.files.image(texture.asset, texture.layer or "").is_8bit)
 
 
 def valid(name: str, taken: Container[str]) -> str:
@@ -200,6 +200,8 @@ class Graph:
             self.tell(parameter, "a second set of coordinates is read by few programs")
         space = self._space(value, texture)
         colorspace = f' colorspace="{SPACES[space]}"' if type.startswith("color") else ""
+        if texture.layer is not None:
+            self.tell(parameter, f"that it is layer {texture.layer!r} of its image is not written")
         path = escape(self.images.path(value.texture, texture))
         if texture.mapping == "box":
             return self._projected(texture, parameter, type, f'type="filename" value="{path}"{colorspace}')

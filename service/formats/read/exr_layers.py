@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from service.formats.errors import ParseError
+from service.formats.errors import LAYER, ParseError
 
 COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # names of channels, in lower case
 VECTOR = ("x", "y", "z")
@@ -16,7 +16,6 @@ CHROMA = ("ry", "by")
 # Names of the layer that is the picture itself, the likeliest first.
 BEAUTY = ("beauty", "combined", "rgba", "rgb", "color", "colour")
 DATA = ("z", "zback", "depth", "id", "ids", "objectid", "materialid", "index", "indexob", "indexma")
-POINTER = "/layer"  # of the refusal of a name
 MOST_NAMES = 20  # in a message
 
 
@@ -46,10 +45,7 @@ def choose(file: Any, wanted: str = "") -> Choice:
     parts = list(_parts(file))
     layers = [layer for k, (name, channels) in enumerate(parts) for layer in _layers(k, name, channels, len(parts))]
     names = tuple(dict.fromkeys(layer.name for layer in layers))
-    if wanted:
-        chosen, warnings = _named(layers, wanted), ()
-    else:
-        chosen, warnings = _likeliest(layers, parts)
+    chosen, warnings = (_named(layers, wanted), ()) if wanted else _likeliest(layers, parts)
     file.seek_subimage(chosen.part, 0)
     return Choice(chosen, names if len(names) > 1 else (), warnings)
 
@@ -95,7 +91,7 @@ def _layers(part: int, title: str, channels: list[str], parts: int) -> Iterator[
     for place, channel in enumerate(channels):
         layer, _, name = channel.rpartition(".")
         groups.setdefault(layer, {}).setdefault(name.lower(), place)
-    used = set()
+    used: set[int] = set()
     for layer, places in groups.items():
         alpha = [places[name] for name in ALPHA if name in places][:1]
         chroma = all(name in places for name in ("y", *CHROMA))
@@ -113,13 +109,13 @@ def _layers(part: int, title: str, channels: list[str], parts: int) -> Iterator[
 
 
 def _named(layers: list[Layer], wanted: str) -> Layer:
-    for same in (lambda name: name == wanted, lambda name: name.lower() == wanted.lower()):
-        for layer in layers:
-            if layer.name and same(layer.name):
-                return layer
+    exact = [layer for layer in layers if layer.name == wanted]
+    found = exact or [layer for layer in layers if layer.name.lower() == wanted.lower()]
+    if found:
+        return found[0]
     names = [name for name in dict.fromkeys(layer.name for layer in layers) if name]
     has = f"it has {listed(names)}" if names else "it has none beside the one that is shown without a name"
-    raise ParseError(f"it has no layer {wanted[:100]!r}; {has}", POINTER)
+    raise ParseError(f"it has no layer {wanted[:100]!r}; {has}", LAYER)
 
 
 def _likeliest(layers: list[Layer], parts: list[tuple[str, list[str]]]) -> tuple[Layer, tuple[str, ...]]:

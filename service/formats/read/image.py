@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.formats.errors import ParseError
+from service.formats.errors import LAYER, ParseError
 from service.formats.images.metadata import exr_attributes
 from service.formats.read.exr_cube import FORMAT as CUBE
 from service.formats.read.exr_cube import TOLD, latitude_longitude
-from service.formats.read.exr_layers import POINTER, check_sampling, choose
+from service.formats.read.exr_layers import check_sampling, choose
 from service.formats.read.hdr_lines import is_new, read_lines
 from service.formats.types import AssetLimits, Floats, ImageData
 
@@ -44,7 +44,7 @@ def parse_image(format: str, data: bytes, limits: AssetLimits, layer: str = "") 
     if not data.startswith(SIGNATURES[format]):
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
     if layer and format != "exr":
-        raise ParseError("belongs to EXR files; other images have no layers", POINTER)
+        raise ParseError("belongs to EXR files; other images have no layers", LAYER)
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
     if is_8bit:
         texels, warnings = _pillow(format, data, limits)

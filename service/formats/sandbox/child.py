@@ -63,7 +63,9 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
     limits = AssetLimits(**request["limits"])
     try:
         with bounded(request["memory"], limits.seconds):
-            parsed = _parse(request["format"], source, limits, request["whole"], Pose(**request["pose"]))
+            parsed = _parse(
+                request["format"], source, limits, request["whole"], Pose(**request["pose"]), request["layer"]
+            )
             arrays, facts = _arrays(parsed)
             del parsed
             fd, table = publish(arrays)
@@ -83,7 +85,7 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
 Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture
 
 
-def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose) -> Parsed:
+def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose, layer: str) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
     as a render that was written with every layer."""
     from service.formats.formats import FOREIGN
@@ -101,7 +103,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
         raise ParseError("the file is empty")
     if format in SIGNATURES:
         data = os.pread(source, size, 0)
-        return parse_rendered(data, limits) if whole else parse_image(format, data, limits)
+        return parse_rendered(data, limits) if whole else parse_image(format, data, limits, layer)
     if format == "cube":
         return parse_cube(os.pread(source, size, 0))
     # The file is in memory already: it is mapped, not copied.

@@ -101,12 +101,15 @@ class Sandbox:
                 _log_rights(self._rights)
             return self._rights
 
-    def parse(self, format: str, source: bytes | int) -> MeshData | ImageData | LutData | MeasuredData:
-        """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh.
+    def parse(
+        self, format: str, source: bytes | int, layer: str = ""
+    ) -> MeshData | ImageData | LutData | MeasuredData:
+        """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh;
+        of an EXR the layer of a name.
 
         Raises ParseError.
         """
-        parsed = self._bounded(format, source, False)
+        parsed = self._bounded(format, source, False, layer=layer)
         assert isinstance(parsed, MeshData | ImageData | LutData | MeasuredData)
         return parsed
 
@@ -122,16 +125,18 @@ class Sandbox:
         assert isinstance(parsed, RenderedPicture)
         return parsed
 
-    def _bounded(self, format: str, source: bytes | int, whole: bool, pose: Pose | None = None) -> Parsed:
+    def _bounded(
+        self, format: str, source: bytes | int, whole: bool, pose: Pose | None = None, layer: str = ""
+    ) -> Parsed:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
             with self._room.taken():
-                return self._parse(format, fd, whole, pose or Pose())
+                return self._parse(format, fd, whole, pose or Pose(), layer)
         finally:
             if isinstance(source, bytes):
                 os.close(fd)
 
-    def _parse(self, format: str, fd: int, whole: bool, pose: Pose) -> Parsed:
+    def _parse(self, format: str, fd: int, whole: bool, pose: Pose, layer: str) -> Parsed:
         size = os.fstat(fd).st_size
         if size > self.limits.max_file:
             raise ParseError(f"{size} bytes; {self.limits.max_file} are allowed")
@@ -147,7 +152,7 @@ class Sandbox:
         caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}
         request = {
             "format": format, "whole": whole, "pose": asdict(pose), "memory": memory, "limits": asdict(limits),
-            "caps": caps,
+            "caps": caps, "layer": layer,
         }  # fmt: skip
         try:
             with (self._cad_children if format == "step" else self.children).one() as child:

@@ -21,7 +21,7 @@ from service.document.environment import (
     SkyEnvironment,
 )
 from service.document.numbers import BRIGHTEST
-from service.formats import Assets, ImageData
+from service.formats import Assets, ImageData, at_fault
 from service.pack.cache import lasting
 from service.pack.lights.environment_blur import blur_cube, blur_image
 from service.problems import AssetError, FieldError, InvalidDocument
@@ -54,7 +54,8 @@ def environment_key(environment: Environment) -> Hashable:
     """A key that is equal where `pack_environment` gives equal results; None where a cache gains nothing or a file
     may change."""
     if isinstance(environment, ImageEnvironment):
-        return ("image", environment.asset, environment.blur) if lasting(environment.asset) else None
+        shown = environment.asset, environment.layer, environment.blur
+        return ("image", *shown) if lasting(environment.asset) else None
     if isinstance(environment, CubemapEnvironment):
         faces = tuple(environment.assets.model_dump().values())
         return ("cubemap", faces, environment.blur) if all(map(lasting, faces)) else None
@@ -72,7 +73,7 @@ def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironm
         return _cube(environment.assets, assets, environment.blur)
     if isinstance(environment, SkyEnvironment):
         return _clear(environment)
-    image = _image(environment.asset, assets, "/environment/asset")
+    image = _image(environment.asset, assets, "/environment/asset", environment.layer)
     height, width = image.pixels.shape[:2]
     if max(height, width) > LARGEST_SIDE:
         raise _refused("/environment/asset", f"is {width} x {height}; at most {LARGEST_SIDE} a side")
@@ -84,16 +85,16 @@ def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironm
 def check_images(environment: Environment, assets: Assets) -> None:
     """Raise InvalidDocument where an image of the environment cannot be read."""
     if isinstance(environment, ImageEnvironment):
-        _image(environment.asset, assets, "/environment/asset")
+        _image(environment.asset, assets, "/environment/asset", environment.layer)
     elif isinstance(environment, CubemapEnvironment):
         _faces(environment.assets, assets)
 
 
-def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
+def _image(reference: str, assets: Assets, pointer: str, layer: str | None = None) -> ImageData:
     try:
-        return assets.image(reference)
+        return assets.image(reference, layer or "")
     except AssetError as error:
-        raise _refused(pointer, error.detail) from None
+        raise _refused(at_fault(error.place, pointer), error.detail) from None
 
 
 def _refused(pointer: str, detail: str) -> InvalidDocument:

@@ -13,7 +13,7 @@ from service.document import Scene
 from service.document.color import LINEAR_OF_BYTE
 from service.document.shape import MeshShape
 from service.document.texture import CheckerTexture, HeightTexture, ImageTexture, is_projected
-from service.formats import Assets, ImageData
+from service.formats import Assets, ImageData, at_fault
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
 
 CHUNK = 1 << 18  # coordinates at a time, which bounds the memory that they take
@@ -44,7 +44,7 @@ class HeightField:
     def _image(self) -> tuple[np.ndarray, bool]:
         """The channel that is read (height, width), and whether it is to be decoded."""
         assert isinstance(self.texture, ImageTexture)
-        image: ImageData = self.assets.image(self.texture.asset)
+        image: ImageData = self.assets.image(self.texture.asset, self.texture.layer or "")
         channel = min("rgba".index(self.reference.channel), image.pixels.shape[2] - 1)
         return image.pixels[..., channel], self.texture.color_space == "srgb" and self.reference.channel != "a"
 
@@ -119,9 +119,9 @@ def _check_channel(material: str, field: HeightField) -> None:
     if not isinstance(field.texture, ImageTexture):
         return
     try:
-        channels = field.assets.image(field.texture.asset).pixels.shape[2]
+        channels = field.assets.image(field.texture.asset, field.texture.layer or "").pixels.shape[2]
     except AssetError as error:
-        pointer = f"/textures/{escaped(field.reference.texture)}/asset"
+        pointer = at_fault(error.place, f"/textures/{escaped(field.reference.texture)}/asset")
         raise InvalidDocument([FieldError(pointer, error.detail)]) from None
     if field.reference.channel == "a" and channels < 4:
         pointer = f"/materials/{escaped(material)}/height/channel"

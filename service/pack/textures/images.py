@@ -16,7 +16,7 @@ from service.document import Scene
 from service.document.texture import (
     ImageTexture,
 )
-from service.formats import Assets, ImageData
+from service.formats import Assets, ImageData, at_fault
 from service.pack.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
 from service.problems import AssetError, FieldError, InvalidDocument, escaped
@@ -45,20 +45,22 @@ class PackedTexels:
 
 
 def images_of(scene: Scene, assets: Assets) -> dict[str, ImageData]:
-    """The images of all textures by asset, of unused ones too, so that a broken one is noticed."""
-    names = {name: texture.asset for name, texture in scene.textures.items() if isinstance(texture, ImageTexture)}
+    """The images of all textures by their content, of unused ones too, so that a broken one is noticed."""
+    shown = {name: texture for name, texture in scene.textures.items() if isinstance(texture, ImageTexture)}
+    first = {texture.content: texture for texture in shown.values()}
     out: dict[str, ImageData] = {}
     errors = []
     with ThreadPoolExecutor(AT_ONCE) as pool:
         # In the caller's context, as lines of the log name its request.
         loading = {
-            asset: pool.submit(copy_context().run, assets.image, asset) for asset in dict.fromkeys(names.values())
+            content: pool.submit(copy_context().run, assets.image, texture.asset, texture.layer or "")
+            for content, texture in first.items()
         }
-    for name, asset in names.items():
+    for name, texture in shown.items():
         try:
-            out[asset] = loading[asset].result()
+            out[texture.content] = loading[texture.content].result()
         except AssetError as error:
-            errors.append(FieldError(f"/textures/{escaped(name)}/asset", error.detail))
+            errors.append(FieldError(at_fault(error.place, f"/textures/{escaped(name)}/asset"), error.detail))
     if errors:
         raise InvalidDocument(errors)
     return out

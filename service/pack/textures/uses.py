@@ -56,7 +56,7 @@ class TextureReference:
     def key(self) -> str:
         """The key under which the texels of an image are stored."""
         assert isinstance(self.texture, ImageTexture)
-        return self.texture.asset + self.suffix
+        return self.texture.content + self.suffix
 
     @property
     def averaged(self) -> Texels | None:
@@ -142,12 +142,12 @@ def sampled(material: Material) -> dict[str, Reference]:
 def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> list[TextureReference]:
     uses = list(_uses(scene, images))
     colored = {
-        use.texture.asset for use in uses if isinstance(use.texture, ImageTexture) and use.averaged is Texels.SRGB
+        use.texture.content for use in uses if isinstance(use.texture, ImageTexture) and use.averaged is Texels.SRGB
     }
     return [
         replace(use, suffix=LINEAR)
         if isinstance(use.texture, ImageTexture)
-        and use.texture.asset in colored
+        and use.texture.content in colored
         and use.averaged is Texels.LINEAR
         and not use.suffix
         else use
@@ -163,7 +163,7 @@ def _uses(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureRefe
             read, texture = _read(scene, reference.texture)
             srgb = is_8bit = False
             if isinstance(texture, ImageTexture):
-                is_8bit = images[texture.asset].is_8bit
+                is_8bit = images[texture.content].is_8bit
                 assumed = is_8bit and isinstance(reference, ColorTexture) and ramp is None
                 srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
             pointer = f"/materials/{escaped(name)}/{key}"
@@ -182,7 +182,7 @@ def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]
     errors = []
     for use in uses:
         name = use.reference.texture
-        channels = images[use.texture.asset].pixels.shape[2] if isinstance(use.texture, ImageTexture) else 3
+        channels = images[use.texture.content].pixels.shape[2] if isinstance(use.texture, ImageTexture) else 3
         if use.ramp is not None:
             given = use.ramp.input
             if isinstance(given, RampInput) and given.channel == "a" and channels < 4:

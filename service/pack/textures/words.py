@@ -43,8 +43,8 @@ def pack_textures(
     images = images_of(scene, assets)
     check_channels(uses_of(scene, images), images)
     uses = uses_of(drawn, images)
-    used = {use.key: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
-    wanted = {use.texture.asset: use.name for use in uses if isinstance(use.texture, ImageTexture)}
+    used = {use.key: use.texture.content for use in uses if isinstance(use.texture, ImageTexture)}
+    wanted = {use.texture.content: use.name for use in uses if isinstance(use.texture, ImageTexture)}
     averaged = {use.key: use.averaged for use in uses if isinstance(use.texture, ImageTexture) and use.averaged}
     texels = lay_out(
         {stored: (wanted[asset], images[asset]) for stored, asset in used.items()}, averaged, cache, limits

@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from types import TracebackType
 
-from service.formats.cache import Parsed, ParsedCache, as_image, as_lut, as_measured, as_mesh, refused
+from service.formats.cache import Parsed, ParsedCache, as_image, as_lut, as_measured, as_mesh, layered, refused
 from service.formats.errors import ParseError
 from service.formats.source import format_of
 from service.formats.types import AssetLimits, ImageData, LutData, MeasuredData, MeshData
@@ -32,11 +32,11 @@ class FileAssets:
             return self._store(ref).mesh(ref)
         return as_mesh(self._load(ref), repr(ref))
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         """Raises AssetError."""
         if ref.startswith("sha256:"):
-            return self._store(ref).image(ref)
-        return as_image(self._load(ref), repr(ref))
+            return self._store(ref).image(ref, layer)
+        return as_image(self._load(ref, layer), repr(ref))
 
     def measured(self, ref: str) -> MeasuredData:
         """Raises AssetError."""
@@ -90,16 +90,16 @@ class FileAssets:
             raise AssetError(f"there is no asset {ref[:100]!r} here")
         return self._fallback
 
-    def _load(self, ref: str) -> Parsed:
+    def _load(self, ref: str, layer: str = "") -> Parsed:
         fd = _open(self._find(ref), ref)
         try:
             found = os.fstat(fd)
             key = f"{found.st_dev}:{found.st_ino}:{found.st_size}:{found.st_mtime_ns}"
-            return self._loader.load(key, lambda: self._parse(fd, ref, found.st_size))
+            return self._loader.load(layered(key, layer), lambda: self._parse(fd, ref, found.st_size, layer))
         finally:
             os.close(fd)
 
-    def _parse(self, fd: int, ref: str, size: int) -> Parsed:
+    def _parse(self, fd: int, ref: str, size: int, layer: str) -> Parsed:
         limits = self._loader.sandbox.limits
         if size > limits.max_file:
             raise AssetError(f"{ref!r} has {size} bytes; {limits.max_file} are allowed")
@@ -109,7 +109,7 @@ class FileAssets:
             what = "is empty" if not size else "is not a mesh or an image in a supported format"
             raise AssetError(f"{ref!r} {what}")
         try:
-            return self._loader.sandbox.parse(format, fd)
+            return self._loader.sandbox.parse(format, fd, layer)
         except ParseError as error:
             raise refused(repr(ref), error) from None
 

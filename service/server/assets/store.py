@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from service.formats.cache import Parsed, ParsedCache, as_image, as_measured, as_mesh, describe, refused
+from service.formats.cache import Parsed, ParsedCache, as_image, as_measured, as_mesh, describe, layered, refused
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.read.scenes.plain_mesh import plain_scene
@@ -200,9 +200,9 @@ class AssetStore:
         """A mesh by its reference. Raises AssetError."""
         return as_mesh(self.load(ref), ref)
 
-    def image(self, ref: str) -> ImageData:
-        """An image by its reference. Raises AssetError."""
-        return as_image(self.load(ref), ref)
+    def image(self, ref: str, layer: str = "") -> ImageData:
+        """An image by its reference, of an EXR the layer of a name. Raises AssetError."""
+        return as_image(self.load(ref, layer=layer), ref)
 
     def measured(self, ref: str) -> MeasuredData:
         """Measured reflection by its reference. Raises AssetError."""
@@ -301,26 +301,31 @@ class AssetStore:
             log.error("could not store an asset", {"id": id, "error": error})
             raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
-    def load(self, ref: str, ahead: bool = False) -> Parsed:
+    def load(self, ref: str, ahead: bool = False, layer: str = "") -> Parsed:
         """An asset of any kind by its reference; `ahead` as ParsedCache.load has it. Raises AssetError."""
         if not ID.fullmatch(ref):
             raise AssetError(f"{ref[:100]!r} is not the id of an asset, `sha256:` and 64 hexadecimal digits")
         known = self._known(ref)
         try:
             format = known.format if known else _format(self._builtin_bytes(ref))
-            return self._parse(ref, format, lambda: self.opened(ref), ahead)
+            return self._parse(ref, format, lambda: self.opened(ref), ahead, layer)
         except NotFound as error:
             raise AssetError(error.detail) from None
 
     def _parse(
-        self, id: str, format: str, opened: Callable[[], AbstractContextManager[Source]], ahead: bool = False
+        self,
+        id: str,
+        format: str,
+        opened: Callable[[], AbstractContextManager[Source]],
+        ahead: bool = False,
+        layer: str = "",
     ) -> Parsed:
         def parse() -> Parsed:
             with opened() as source:
-                return self.loader.sandbox.parse(format, for_sandbox(source))
+                return self.loader.sandbox.parse(format, for_sandbox(source), layer)
 
         try:
-            return self.loader.load(id, parse, ahead)
+            return self.loader.load(layered(id, layer), parse, ahead)
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
 

@@ -117,9 +117,9 @@ class VisibleFiles:
         self._check(ref)
         return self._assets.mesh(ref)
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         self._check(ref)
-        return self._assets.image(ref)
+        return self._assets.image(ref, layer)
 
     def measured(self, ref: str) -> MeasuredData:
         self._check(ref)

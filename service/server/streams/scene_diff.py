@@ -118,7 +118,8 @@ def _environment(scene: Scene) -> object:
 
 def _files(scene: Scene) -> list[object]:
     e = scene.environment
-    faces = list(e.assets) if isinstance(e, CubemapEnvironment) else [getattr(e, "asset", None)]
-    images = (getattr(texture, "asset", None) for texture in scene.textures.values())
+    one = getattr(e, "asset", None), getattr(e, "layer", None)
+    faces = list(e.assets) if isinstance(e, CubemapEnvironment) else [one]
+    images = (getattr(texture, "content", None) for texture in scene.textures.values())
     others = (getattr(each, "asset", None) for each in (*scene.shapes, *scene.materials.values()))
     return [*faces, *images, *others]

@@ -35,7 +35,7 @@ class CubeAssets:
     def measured(self, ref: str) -> MeasuredData:
         raise KeyError(ref)
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         ahead, right, down = CUBE_FACES[ref]
         s = (2 * np.arange(FACE) + 1) / FACE - 1
         d = np.array(ahead) + np.multiply.outer(s, down)[:, None] + np.multiply.outer(s, right)

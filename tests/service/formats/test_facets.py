@@ -35,7 +35,7 @@ class One:
     def mesh(self, ref: str) -> MeshData:
         return self._mesh
 
-    def image(self, ref: str) -> Any:
+    def image(self, ref: str, layer: str = "") -> Any:
         raise AssertionError(ref)
 
     def measured(self, ref: str) -> Any:

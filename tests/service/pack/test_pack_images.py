@@ -29,19 +29,19 @@ class Meeting(Images):
         self._both = threading.Barrier(2, timeout=PATIENCE_S)
         self.requests: list[str] = []
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         self._both.wait()
         self.requests.append(REQUEST.get())
-        return super().image(ref)
+        return super().image(ref, layer)
 
 
 class Broken(Images):
     """No image whose name begins with "broken" can be read."""
 
-    def image(self, ref: str) -> ImageData:
+    def image(self, ref: str, layer: str = "") -> ImageData:
         if ref.startswith("broken"):
             raise AssetError(f"{ref} can't be read")
-        return super().image(ref)
+        return super().image(ref, layer)
 
 
 def textured(**assets: str) -> dict[str, object]:

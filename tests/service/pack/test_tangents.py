@@ -212,8 +212,8 @@ def given(direction: Any, w: float, normals: np.ndarray = OUT, uvs: np.ndarray |
 class Given(Shelf):
     """Meshes, and the maps."""
 
-    def image(self, ref: str) -> Any:
-        return MAPS.image(ref)
+    def image(self, ref: str, layer: str = "") -> Any:
+        return MAPS.image(ref, layer)
 
 
 TILE = {"type": "mesh", "asset": "sha256:mesh", "material": "m"}
