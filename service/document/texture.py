@@ -80,7 +80,7 @@ def content_of(asset: str, layer: str | None) -> str:
 Layer = Annotated[
     Annotated[str, Field(min_length=1, max_length=300)] | None,
     OMITTABLE,
-    hint("Layer", "Of an EXR that has several, by its name; without it the picture itself."),
+    hint("Layer", "Of an EXR that has several, by its name; without it the picture itself.", widget="text"),
 ]
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
+from tests.exr_files import written
 from tests.web.editing import halves
 from tests.web.editor import Editor
 
@@ -22,7 +24,7 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     assert page.is_hidden("#drop"), "what the page would do with a file is said no more"
     before = editor.settled()
     page.click(f"{BENEATH} > summary")
-    for name in ("channel", "factor", "color_space", "wrap", "scale", "rotation", "offset"):
+    for name in ("channel", "factor", "color_space", "layer", "wrap", "scale", "rotation", "offset"):
         assert page.is_visible(f"{BENEATH} [data-field={name}]"), name
 
     offset = page.locator(f"{BENEATH} [data-field=offset] input").first
@@ -97,6 +99,32 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
     assert coat["base_color"] == {"texture": "other", "channel": "r", "factor": [0.5, 0.5, 0.5]}
     assert coat["roughness"] == {"texture": "halves"}
     assert textures["other"]["rotation"] == textures["halves"]["rotation"] == 30
+
+
+def test_a_layer_of_an_image_is_named(editor: Editor) -> None:
+    """It goes with the image, and a name that is not there is told at its control."""
+    page = editor.page
+    texels = np.zeros((4, 4, 6), np.float32)
+    texels[..., 0], texels[..., 5] = 1, 1
+    layers = written(texels, [f"{layer}.{channel}" for layer in ("AO", "beauty") for channel in "RGB"])
+    editor.drop("#material-form [data-field=base_color]", {"layers.exr": layers})
+    editor.wait("the texture", lambda: page.is_visible(BENEATH))
+    before = editor.settled()
+    page.click(f"{BENEATH} > summary")
+    layer = page.locator(f"{BENEATH} [data-field=layer] input")
+    layer.fill("depth")
+    layer.press("Enter")
+    trouble = f"{BENEATH} [data-field=layer] .trouble"
+    editor.wait("the refusal", lambda: page.is_visible(trouble))
+    assert "AO, beauty" in editor.text(trouble)
+    layer.fill("AO")
+    layer.press("Enter")
+    editor.wait_for_change(before, 8)
+    editor.wait("forgiveness", lambda: page.is_hidden(trouble))
+    assert json.loads(editor.shot("#download-scene"))["textures"]["layers"]["layer"] == "AO"
+    editor.drop("#material-form [data-field=base_color]", {"halves.png": halves()})
+    editor.wait("the other image", lambda: "halves" in editor.text("[data-field=base_color] .texture"))
+    assert "layer" not in json.loads(editor.shot("#download-scene"))["textures"]["halves"]
 
 
 def test_what_is_wrong_with_a_texture_is_said_at_its_control(editor: Editor) -> None:

@@ -23,9 +23,9 @@ export function given(state, place, texture, wanted) {
   return used({ ...state, scene: { ...state.scene, textures: { ...textures, [name]: texture } } }, place, name);
 }
 
-// With an uploaded image, that lies as the image lay whose place it takes.
+// With an uploaded image, that lies as the image lay whose place it takes. A layer is one of that image.
 export function pictured(state, place, asset, wanted) {
-  const { type, ...lying } = state.scene.textures?.[reading(state, place).texture] ?? {};
+  const { type, layer, ...lying } = state.scene.textures?.[reading(state, place).texture] ?? {};
   return given(state, place, { ...(type ? {} : lying), asset }, wanted);
 }
 

@@ -258,6 +258,39 @@ function fileEntry(id, { pick }) {
   };
 }
 
+// A word, such as a name in a file; an empty one is none.
+function textEntry(id, { input, commit, restore }) {
+  const clean = () => {
+    delete box.dataset.dirty;
+  };
+  const box = element("input", {
+    type: "text",
+    class: "entry",
+    id,
+    autocomplete: "off",
+    spellcheck: "false",
+    oninput: () => {
+      box.dataset.dirty = "yes";
+    },
+    onchange: () => {
+      clean();
+      input(box.value.trim() || undefined);
+      commit();
+    },
+    onkeydown: (event) => {
+      if (event.key !== "Escape") return;
+      clean();
+      restore();
+    },
+  });
+  return {
+    element: box,
+    show(value) {
+      if (!isBeingEdited(box)) box.value = value ?? "";
+    },
+  };
+}
+
 const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
 
 // A field may come with a way to make its own.
@@ -271,6 +304,7 @@ export function control(field, id, events) {
   if (field.widget === "texture") return { element: element("span", { id }), show() {} }; // its slot is all there is
   if (field.widget === "file") return fileEntry(id, events);
   if (field.widget === "choices") return choices(field, id, events);
+  if (field.widget === "text") return textEntry(id, events);
   if (field.widget === "choice") return choice(field, id, events);
   if (field.widget === "toggle") return toggle(field, id, events);
   if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events, "wide");

@@ -110,7 +110,9 @@ function field(schema, name, raw, required) {
             ? (bound(nodes, "x-widget") ?? "number")
             : reference
               ? "texture"
-              : null;
+              : bound(nodes, "x-widget") === "text"
+                ? "text"
+                : null;
   const log = bound(nodes, "x-log");
   const widget = file ? "file" : log ? (color ? "amounts" : "amount") : usual;
   if (!widget || bound(nodes, "const") !== undefined) return null;

@@ -177,6 +177,8 @@ const usual=color
 ?(bound(nodes,"x-widget")?? "number")
 :reference
 ? "texture"
+:bound(nodes,"x-widget")==="text"
+? "text"
 :null;
 const log=bound(nodes,"x-log");
 const widget=file ? "file":log ?(color ? "amounts":"amount"):usual;
@@ -1018,6 +1020,37 @@ button.textContent=value ? "Another file…":"Choose a file…";
 },
 };
 }
+function textEntry(id,{input,commit,restore}){
+const clean=()=>{
+delete box.dataset.dirty;
+};
+const box=element("input",{
+type:"text",
+class:"entry",
+id,
+autocomplete:"off",
+spellcheck:"false",
+oninput:()=>{
+box.dataset.dirty="yes";
+},
+onchange:()=>{
+clean();
+input(box.value.trim()||undefined);
+commit();
+},
+onkeydown:(event)=>{
+if(event.key !=="Escape")return;
+clean();
+restore();
+},
+});
+return{
+element:box,
+show(value){
+if(!isBeingEdited(box))box.value=value ?? "";
+},
+};
+}
 const bounded=({soft})=>Number.isFinite(soft.max - soft.min);
 function control(field,id,events){
 if(field.make)return field.make(field,id,events);
@@ -1029,6 +1062,7 @@ if(field.widget==="vector")return vector(field,id,events);
 if(field.widget==="texture")return{element:element("span",{id}),show(){}};
 if(field.widget==="file")return fileEntry(id,events);
 if(field.widget==="choices")return choices(field,id,events);
+if(field.widget==="text")return textEntry(id,events);
 if(field.widget==="choice")return choice(field,id,events);
 if(field.widget==="toggle")return toggle(field,id,events);
 if(field.widget==="number"||!bounded(field))return numberEntry(field,id,events,"wide");
