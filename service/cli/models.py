@@ -1,27 +1,20 @@
 """Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY, an
 STL or a USD file; and materials, a .mtlx with its images beside it.
 
-The importer always reads one file: a .gltf with its files inlined, an OBJ or a .mtlx and its files as a zip.
+The importer always reads one file: a model that names others is read from a zip of all of them.
 """
 
 from __future__ import annotations
 
-import base64
-import json
-import posixpath
-import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import unquote
 
 from service.cli import BadInput
 from service.formats import formats
 from service.formats.errors import ParseError
-from service.formats.formats import sniff, text
+from service.formats.formats import sniff
 from service.formats.read.gltf.document import load
-from service.problems import AssetError
 
 if TYPE_CHECKING:
     from service.formats.scene_import import Imported
@@ -30,8 +23,8 @@ if TYPE_CHECKING:
 
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip", ".mtlx", ".usd", ".usda", ".usdc", ".usdz")
-WHOLE = ("glb", "zip", "ply", "stl", "usd")  # formats that are one file
-MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
+WHOLE = ("glb", "zip", "ply", "stl", "usd")  # formats that bytes tell
+TITLES = {"obj": "the OBJ file", "mtlx": "the MaterialX file", "gltf": "the glTF file", "ply": "the PLY file"}
 
 
 def is_model(path: Path, data: bytes) -> bool:
@@ -45,21 +38,22 @@ def is_model(path: Path, data: bytes) -> bool:
     return isinstance(tree, dict) and isinstance(tree.get("asset"), dict)
 
 
-def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, pose: Pose | None = None) -> Imported:
-    """The model, perhaps in a pose, as a document whose references are assets of `store`. Prints warnings. Raises
-    ServiceError."""
-    format = sniff(data, filename=path.name)
-    title = None
-    if format == "obj":
-        data, title = _zipped(path, data, files), "the OBJ file"
-    elif format == "mtlx":
-        data, format, title = _with_images(path, data, files), "zip", "the MaterialX file"
-    elif format not in WHOLE:
-        data, format = _embedded(data, files), "gltf"
+def import_model(
+    path: Path, data: bytes, store: AssetStore, files: FileAssets, pose: Pose | None = None, entry: str | None = None
+) -> Imported:
+    """The model, perhaps in a pose, as a document whose references are assets of `store`; of several in a zip that
+    which `entry` names. Prints warnings. Raises ServiceError."""
+    from service.cli.neighbours import with_parts
     from service.formats.types import Pose
     from service.server.assets.posing import posed_scene
 
-    info = store.add(data, filename=f"model.{format}", title=title)
+    format = sniff(data, filename=path.name) or "gltf"
+    if format not in (*WHOLE, *TITLES):
+        format = "gltf"  # the importer says what is wrong
+    title = TITLES.get(format)
+    if format in (*TITLES, "glb") and (packed := with_parts(path, data, format, files)) is not None:
+        data, format = packed, "zip"
+    info = store.add(data, filename=f"model.{format}", title=title, entry=entry)
     imported = store.materials(info.id) if info.kind == "materials" else posed_scene(store, info.id, pose or Pose())
     for warning in imported.warnings:
         place = f"{warning['pointer']}: " if warning["pointer"] else ""
@@ -70,7 +64,7 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets, 
 def zipped_images(folder: Path) -> bytes:
     """The images of a folder, and its MaterialX files, as a zip. Raises BadInput where there is none."""
     from service.cli import files
-    from service.formats.read.obj.importer import zipped
+    from service.formats.read.archive import zipped
 
     endings = tuple(f".{ending}" for ending, format in formats.SUFFIXES.items() if formats.KINDS[format] == "image")
     taken = (*endings, ".mtlx")
@@ -78,92 +72,3 @@ def zipped_images(folder: Path) -> bytes:
     if not paths:
         raise BadInput(f"{str(folder)!r}: holds no images ({', '.join(endings)})")
     return zipped({f"{folder.resolve().name}/{path.name}": files.read(path) for path in paths})
-
-
-def _embedded(data: bytes, files: FileAssets) -> bytes:
-    """The JSON of a .gltf with the files that it names inlined."""
-    try:
-        tree = load(data)
-    except ParseError:
-        return data  # unchanged: the importer reports the mistake and its place
-    for kind in ("buffers", "images"):
-        items = tree.get(kind) if isinstance(tree, dict) else None
-        for k, item in enumerate(items if isinstance(items, list) else ()):
-            uri = item.get("uri") if isinstance(item, dict) else None
-            if isinstance(uri, str) and not uri.startswith("data:"):
-                item["uri"] = _read(uri, f"/{kind}/{k}/uri", files)
-    return json.dumps(tree, sort_keys=True).encode()
-
-
-def _read(uri: str, pointer: str, files: FileAssets) -> str:
-    if "://" in uri:
-        raise BadInput(f"{pointer}: {uri[:100]!r} lies elsewhere; only files beside the model are read")
-    try:
-        data = files.read(unquote(uri))
-    except AssetError as error:
-        raise BadInput(f"{pointer}: {error.detail}") from None
-    return "data:application/octet-stream;base64," + base64.b64encode(data).decode()
-
-
-def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
-    """A zip of the OBJ and those of its libraries and textures that exist."""
-    from service.formats.read.obj.importer import zipped
-
-    found = {located: files.read(located) for located in _libraries(data, files)}
-    for library, content in list(found.items()):
-        found |= {image: files.read(image) for image in _textures(library, content, files)}
-    # A path may lead out of the folder where --asset-root allows that: in the zip the model lies as deep.
-    deep = max((name.split("/").count("..") for name in found), default=0)
-    folder = "/".join(["model"] * deep)
-    member = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
-    entries = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in found.items()}
-    return zipped(entries | {posixpath.join(folder, member): data})
-
-
-def _with_images(path: Path, data: bytes, files: FileAssets) -> bytes:
-    """A zip of the MaterialX file and those of its images that exist; a larger one is refused as such."""
-    from service.formats.read.materialx.document import file_names
-    from service.formats.read.obj.importer import zipped
-    from service.formats.read.obj.paths import is_absolute, located
-
-    found = {located("", name): name for name in file_names(data) if "://" not in name and not is_absolute(name)}
-    entries = {place: files.read(place) for place, name in found.items() if _is_there(place, name, files)}
-    deep = max((name.split("/").count("..") for name in entries), default=0)
-    folder = "/".join(["model"] * deep)
-    named = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in entries.items()}
-    member = (path.name if path.suffix.lower() == ".mtlx" else f"{path.name}.mtlx").replace("\\", "_")
-    return zipped(named | {posixpath.join(folder, member): data})
-
-
-def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:
-    """The paths of the material libraries that exist, relative to the model's folder."""
-    from service.formats.read.obj.paths import library_names, located
-
-    for statement in dict.fromkeys(MTLLIB.findall(text(data))):
-        for name in library_names(statement.decode("utf-8", "replace").strip()):
-            if not name.lower().endswith(".obj") and _is_there(located("", name), "mtllib", files):
-                yield located("", name)
-
-
-def _textures(library: str, content: bytes, files: FileAssets) -> Iterator[str]:
-    """The paths of existing images that a library names, relative to the model's folder."""
-    from service.formats.read.obj.mtl import read_mtl
-    from service.formats.read.obj.paths import located
-    from service.formats.read.scenes.warnings import Warnings
-
-    try:
-        materials = read_mtl(library, content, Warnings())  # the importer reports its oddities
-    except ParseError:
-        return  # and its mistakes
-    for material in materials.values():
-        for found in material.maps.values():
-            path = located(library, found.reference)
-            if _is_there(path, found.place, files):
-                yield path
-
-
-def _is_there(path: str, place: str, files: FileAssets) -> bool:
-    try:
-        return files.holds(path)
-    except AssetError as error:
-        raise BadInput(f"{place}: {error.detail}") from None

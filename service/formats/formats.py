@@ -114,6 +114,14 @@ def text(data: bytes) -> bytes:
     return data
 
 
+def decoded(data: bytes) -> str:
+    """Words of a text in UTF-8, or as programs on Windows write them, whose bytes mean nothing in UTF-8."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return "".join(bytes((byte,)).decode("cp1252", "ignore") or chr(byte) for byte in data)
+
+
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
     """A key of KINDS, or None where the format is unknown."""
     head = data[:65536]

@@ -11,7 +11,7 @@ from typing import Any
 from service.formats.types import Kind, Pose, SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument, NotFound
 
-IMPORTER = 9  # raised when files must be imported anew, because their documents or warnings change
+IMPORTER = 10  # raised when files must be imported anew, because their documents or warnings change
 PART = re.compile(r"part:(\d+)")
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from service.formats.errors import ParseError
+from service.formats.formats import decoded
 from service.formats.read.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
@@ -150,7 +151,7 @@ def _named(text: bytes, starts: Longs, numbers: Longs, rows: Longs, faces: npt.N
         start = int(starts[row])
         keyword, *rest = text[start : text.index(b"\n", start)].split(None, 1)
         if keyword in NAMING:
-            name = rest[0].decode("utf-8", "replace").strip() if rest else ""
+            name = decoded(rest[0]).strip() if rest else ""
             yield Named(keyword.decode(), name, int(numbers[row]), int(before[row]))
 
 

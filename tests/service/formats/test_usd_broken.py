@@ -12,6 +12,7 @@ import pytest
 
 from service.formats.cache import refused
 from service.formats.errors import MissingExtra, ParseError
+from service.formats.read.zips import importer as zips
 from service.formats.sandbox import readers
 from service.formats.types import AssetLimits
 from service.problems import ANSWERS, AssetError, NotProvided
@@ -119,7 +120,7 @@ def test_broken_binary_layers_end_a_child_at_most(store: AssetStore, tmp_path: P
 
 def test_without_the_extra_the_refusal_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr(readers, "find_spec", lambda name: None)
+    monkeypatch.setattr(zips, "find_spec", lambda name: None)
     with pytest.raises(MissingExtra) as caught:
         readers.read_usd_scene(memoryview(usda(mesh("Sign"))), AssetLimits())
     answer = refused("the USD file", caught.value)

@@ -13,9 +13,11 @@ LONGEST = 300  # characters of a pointer or a detail
 
 @dataclass
 class Warnings:
-    """Details in the order in which they were found, each with its first place and the number of its places."""
+    """Details in the order in which they were found, each with its first place and the number of its places; or
+    `by_place`, each with every one."""
 
-    _places: dict[str, set[str]] = field(default_factory=dict)  # by detail
+    by_place: bool = False
+    _places: dict[str, dict[str, None]] = field(default_factory=dict)  # by detail
     _first: dict[str, str] = field(default_factory=dict)
     _unlisted: int = 0
     _omissions: dict[str, None] = field(default_factory=dict)  # details that say why triangles are missing
@@ -23,9 +25,9 @@ class Warnings:
     def add(self, pointer: str, detail: str) -> None:
         pointer, detail = pointer[:LONGEST], detail[:LONGEST]
         if detail in self._first:
-            self._places[detail].add(pointer)
+            self._places[detail][pointer] = None
         elif len(self._first) < MOST:
-            self._first[detail], self._places[detail] = pointer, {pointer}
+            self._first[detail], self._places[detail] = pointer, {pointer: None}
         else:
             self._unlisted += 1
 
@@ -46,9 +48,13 @@ class Warnings:
         """`[{pointer, detail, count}]`; without `count` where the pointer is the only place."""
         listed: list[dict[str, Any]] = []
         for detail, pointer in self._first.items():
+            if self.by_place:
+                listed += [{"pointer": place, "detail": detail} for place in self._places[detail]]
+                continue
             count = len(self._places[detail])
             more = f" (here and in {count - 1} more place{'s' if count > 2 else ''})" if count > 1 else ""
             listed.append({"pointer": pointer, "detail": detail + more} | ({"count": count} if count > 1 else {}))
-        if self._unlisted:
-            listed.append({"pointer": "", "detail": f"there are {self._unlisted} more warnings"})
+        unlisted = self._unlisted + max(len(listed) - MOST, 0)
+        if unlisted:
+            listed = [*listed[:MOST], {"pointer": "", "detail": f"there are {unlisted} more warnings"}]
         return listed

@@ -8,7 +8,7 @@ from typing import Any
 
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
-from service.formats.read.obj.archive import Archive
+from service.formats.read.archive import Archive
 from service.formats.read.obj.textures import FORMATS
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -32,18 +32,15 @@ RELIEF = 0.02  # metres from black to white, as of bricks or bark: images do not
 CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
 
-def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
-    """The materials of a zip, each a `principled`. Raises ParseError."""
-    notes, files = Warnings(), PartFiles()
+def read_texture_sets(archive: Archive, limits: AssetLimits, nothing: str) -> SceneFile:
+    """The materials of a zip, each a `principled`. Raises ParseError, which says `nothing` where there is none."""
+    notes, files = Warnings(by_place=True), PartFiles()  # each file that is not taken is named
     note = by_note(archive)
     others = [path for path in archive.names if note is None or path != note[0]]
     images = {path: data for path in others if (data := _image(archive, path, notes)) is not None}
     sets = texture_sets(images, notes)
     if not sets:
-        raise ParseError(
-            "the zip holds no OBJ file, and no images whose names say what they are, such as wood_color.png and "
-            "wood_normal.png"
-        )
+        raise ParseError(nothing)
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
     textures = _Textures(images, files, limits)
