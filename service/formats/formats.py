@@ -84,6 +84,13 @@ CONTENT_TYPES = {
 
 SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr", "usda": "usd", "usdc": "usd"}
 
+# Endings of models in formats that are not read, which come in zips beside their textures.
+OTHER_MODELS = (
+    ".3dm", ".3ds", ".3mf", ".abc", ".blend", ".c4d", ".dae", ".fbx", ".iges", ".igs", ".lwo", ".ma", ".max", ".mb",
+    ".skp", ".sldprt", ".step", ".stp", ".x3d",
+)  # fmt: skip
+UNREAD = "a model in a format that is not read; export it as glTF (.glb)"
+
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")

@@ -7,6 +7,7 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -264,6 +265,7 @@ def test_several_models_over_rest(server: Server) -> None:
             "the zip holds readme.txt, a.blend, 0.dat, 1.dat, 2.dat, 3.dat, 4.dat, 5.dat, 6.dat, 7.dat and 2 more; "
             "no model",
         ),
+        ({"readme.txt": "hi", "a.FBX": b"x"}, "a.FBX is a model in a format that is not read; export it as glTF"),
         ({"IMG_1.png": OAK}, "the zip holds IMG_1.png; no model"),
         ({"IMG_1.png": OAK}, "no images whose names say what they are"),
         ({"in.zip": zipped({"a.obj": TEXTURED})}, "the zip holds in.zip; a zip within a zip is not opened"),
@@ -284,6 +286,11 @@ def test_a_zip_beside_a_model_is_told(store: AssetStore) -> None:
     assert "source.zip" in detail and "a zip within a zip is not opened" in detail
     info = store.add(zipped({"source.zip": zipped({"b.obj": TEXTURED}), "oak_color.png": OAK}))
     assert [warning["pointer"] for warning in info.warnings or []] == ["source.zip"]
+
+
+def test_a_model_that_is_not_read_is_told_beside_its_textures(store: AssetStore) -> None:
+    info = store.add(zipped({"oak.blend": b"BLENDER", "oak_color.png": OAK}))
+    assert told(info) == ["a model in a format that is not read; export it as glTF (.glb); left out"]
 
 
 def test_each_file_that_makes_no_material_is_named(store: AssetStore) -> None:
@@ -310,6 +317,15 @@ def test_an_image_that_is_lost_is_told_and_the_model_shown(store: AssetStore) ->
     web, binary = scattered("https://example.org/oak.png")
     info = store.add(zipped({"a.gltf": web, "scene.bin": binary, "oak.png": OAK}))
     assert "the image 'https://example.org/oak.png' is not there" in told(info)[0]
+
+
+def test_a_zip_that_was_recorded_as_materials_is_a_scene_now(tmp_path: Path) -> None:
+    """An older version took the images of a zipped glTF for all that there is."""
+    with closing(AssetStore(tmp_path, Config())) as own:
+        id = own.add(zipped(sketchfab())).id
+        (record,) = (path for path in tmp_path.rglob("*") if path.is_file() and id in path.read_text("latin-1")[:200])
+        record.write_text(json.dumps(json.loads(record.read_text()) | {"kind": "materials"}))
+        assert own.info(id).kind == "materials" and own.scene(id).document["shapes"]
 
 
 def test_the_command_takes_a_zip_and_one_of_its_models(

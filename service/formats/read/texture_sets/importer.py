@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, sniff
+from service.formats.formats import KINDS, OTHER_MODELS, UNREAD, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.obj.textures import FORMATS
 from service.formats.read.scenes.names import unique
@@ -60,6 +60,9 @@ def read_texture_sets(archive: Archive, limits: AssetLimits, nothing: str) -> Sc
 
 
 def _image(archive: Archive, path: str, notes: Warnings) -> bytes | None:
+    if path.lower().endswith(OTHER_MODELS):
+        notes.add(path, f"{UNREAD}; left out")
+        return None
     data = archive.read(path)
     format = sniff(data, filename=path) if data else None
     if format is None or KINDS[format] != "image":

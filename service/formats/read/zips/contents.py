@@ -6,7 +6,7 @@ import posixpath
 from dataclasses import dataclass, field
 
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, MAGIC, SUFFIXES, USD_LAYERS
+from service.formats.formats import KINDS, MAGIC, OTHER_MODELS, SUFFIXES, UNREAD, USD_LAYERS
 from service.formats.read.archive import Archive, listed
 from service.formats.read.references import Finder
 
@@ -76,7 +76,10 @@ def nothing(archive: Archive, found: Contents) -> str:
         return f"the zip holds {listed(found.zips)}; {how}"
     kinds = {KINDS[format] for format in map(_suffix_format, archive.names) if format}
     images = ", and no images whose names say what they are, such as wood_color.png and wood_normal.png"
-    return f"the zip holds {listed(archive.names)}; no model ({READ}){images if 'image' in kinds else ''}"
+    others = [name for name in archive.names if name.lower().endswith(OTHER_MODELS)]
+    unread = f"; {listed(others[:1])} is {UNREAD}" if others else ""
+    what = f"no model ({READ}){images if 'image' in kinds else ''}"
+    return f"the zip holds {listed(archive.names)}; {what}{unread}"
 
 
 def _suffix_format(name: str) -> str:
