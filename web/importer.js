@@ -1,5 +1,5 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, several of one set a material, as MaterialX does, glTF, USD and zipped OBJ a scene, .cube files the
+// images textures, several of one set a material, as MaterialX does, glTF, USD and zipped models a scene, .cube files the
 // table that the picture's colours go through, measured reflection a material, JSON what it says.
 
 import { fetchAssetMaterials, fetchAssetScene, fetchPosedScene, upload } from "./server/api.js";

@@ -26,7 +26,8 @@ health         the container's health check
 assets         the assets of a scene, and their ids
 documents      documents and settings, from files and from `--set`
 files          files that are read, and written whole or not at all
-models         models with the files that they refer to
+models         models as the importers read them
+neighbours     the files that a model on disk refers to
 progress       how far a render is, on stderr
 tracing        one render in this process
 local          renders in a Python program's own process: `sunbox.render`

@@ -55,13 +55,16 @@ class Source:
     warned: frozenset[str] = frozenset()  # texts of the printed warnings about a model, without their places
 
 
-def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
-    """The scene that a document, a glTF or OBJ model, or the metadata of a PNG or EXR describes."""
+def read_source(path: Path, roots: Sequence[str], config: Config, entry: str | None = None) -> Source:
+    """The scene that a document, a model, or the metadata of a PNG or EXR describes; of several models in a zip that
+    which `entry` names."""
     data = files.read(path)
     from service.cli.models import is_model
 
     if is_model(path, data):
-        return _model(path, data, roots, config)
+        return _model(path, data, roots, config, entry)
+    if entry is not None:
+        raise BadInput("--entry: names a model of a zip; the input is none")
     from service.document import load_json, parse_scene
     from service.formats.images.metadata import EXR_MAGIC, PNG_MAGIC, is_webp, read_metadata
 
@@ -81,7 +84,7 @@ def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
         return Source(path, document, parse_scene(document))
 
 
-def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Source:
+def _model(path: Path, data: bytes, roots: Sequence[str], config: Config, entry: str | None) -> Source:
     from service.cli.models import import_model
     from service.document import parse_scene, presets
     from service.formats.images.recipe import PictureView
@@ -93,7 +96,7 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
         _expect_meshes()
     try:
         with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
-            model = import_model(path, data, store, files_)
+            model = import_model(path, data, store, files_, entry=entry)
             if model.kind == "materials":
                 raise BadInput(f"{str(path)!r}: holds materials and no shapes; `sunbox import` writes them")
             document = model.scene(presets.default_environment())

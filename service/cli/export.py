@@ -19,7 +19,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise BadInput(f"-o {arguments.output!r}: must end in {endings}")
     target = files.writable(Path(arguments.output))
     config = configuration()
-    source = read_source(Path(arguments.input), arguments.asset_root, config)
+    source = read_source(Path(arguments.input), arguments.asset_root, config, arguments.entry)
     with source_assets(source, arguments.asset_root, config) as assets, refusals(source.pointer):
         exported = FORMATS[name].scene_writer(source.scene, assets, config)
     for path, data in exported.beside.items():

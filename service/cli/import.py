@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         FileAssets(source.parent, asset_folders(arguments.asset_root), store) as beside,
         refusals(),
     ):
-        model = import_model(source, data, store, beside, pose)
+        model = import_model(source, data, store, beside, pose, arguments.entry)
         _tell_choices(model, pose)
         document = model.scene(presets.default_environment())
         if model.kind == "materials":

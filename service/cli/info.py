@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     packed = None
     if arguments.scene:
-        source = read_source(Path(arguments.scene), arguments.asset_root, config)
+        source = read_source(Path(arguments.scene), arguments.asset_root, config, arguments.entry)
         with source_assets(source, arguments.asset_root, config) as assets:
             packed = pack_scene(source, assets, config)
         _print([("scene", str(source.path)), *contents(source.scene, packed)])

@@ -110,6 +110,7 @@ def _render(command: argparse.ArgumentParser) -> None:
     _picture(command)
     _settings(command)
     add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
+    _entry(command)
     _asset_root(command)
 
 
@@ -157,6 +158,7 @@ def _batch(command: argparse.ArgumentParser, output: str) -> None:
     add("--exposure", type=float, default=0.0, metavar="STOPS", help="of the pictures (default: 0)")
     _settings(command)
     add("--server", metavar="URL", help="a server that renders it (default: this machine, without one)")
+    _entry(command)
     _asset_root(command)
 
 
@@ -243,6 +245,7 @@ def _info(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF, OBJ, PLY or STL model")
     text = "also compile the scene's kernel and one with all common features, and measure both: a minute or more"
     command.add_argument("--measure", action="store_true", help=text)
+    _entry(command)
     _asset_root(command)
 
 
@@ -269,11 +272,15 @@ def _asset_root(command: argparse.ArgumentParser) -> None:
     command.add_argument("--asset-root", action="append", default=[], metavar="DIR", help=text)
 
 
+def _entry(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--entry", metavar="NAME", help="the model to take from a zip that holds several")
+
+
 def _import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "model",
         metavar="MODEL",
-        help="a .glb, .ply, .stl or .usdz; a .gltf or .obj with its files beside it; a .zip of an .obj and its "
+        help="a .glb, .ply, .stl or .usdz; a .gltf or .obj with its files beside it; a .zip of a model and its "
         "files; or a .zip or a folder of textures whose names say what they are",
     )
     text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
@@ -281,6 +288,7 @@ def _import(command: argparse.ArgumentParser) -> None:
     command.add_argument("--variant", metavar="NAME", help="a glTF file's materials in this variant")
     command.add_argument("--animation", metavar="NAME", help="a glTF file as this animation has it")
     command.add_argument("--time", type=float, metavar="S", help="at this time in the animation (default: its start)")
+    _entry(command)
     _asset_root(command)
 
 
@@ -289,6 +297,7 @@ def _export(command: argparse.ArgumentParser) -> None:
     command.add_argument("input", metavar="SCENE", help=text)
     text = "the file, whose ending says its format: .glb, .mtlx. What it has no place for is printed on stderr"
     command.add_argument("-o", "--output", required=True, metavar="OUT", help=text)
+    _entry(command)
     _asset_root(command)
 
 

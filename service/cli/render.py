@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     reuse_freed()
     from service.formats.images.cryptomatte import names_of
 
-    source = read_source(Path(arguments.input), arguments.asset_root, config)
+    source = read_source(Path(arguments.input), arguments.asset_root, config, arguments.entry)
     output = Output(path, format, _view(arguments, format, exposure, source.view))
     if arguments.cryptomatte:
         output = replace(output, names=names_of(source.document))

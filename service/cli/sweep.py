@@ -70,7 +70,7 @@ def batch_file(
     from service.cli.documents import read_settings, read_source, with_uploads
 
     config = configuration()
-    source = read_source(Path(arguments.input), arguments.asset_root, config)
+    source = read_source(Path(arguments.input), arguments.asset_root, config, arguments.entry)
     settings = read_settings(arguments.set or [], config, source.settings).model_dump(mode="json", exclude_unset=True)
     with server_or_local(arguments.server) as client:
         scene = with_uploads(client, source, arguments.asset_root)

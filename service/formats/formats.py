@@ -114,6 +114,12 @@ UNREADABLE = (
     (None, CAD_FILES, "this CAD format is not supported; export STEP from the program that wrote it"),
 )
 
+# Endings of models in formats that are not read, which come in zips beside their textures.
+OTHER_MODELS = (
+    ".3dm", ".abc", ".blend", ".c4d", ".iges", ".igs", ".lwo", ".ma", ".max", ".mb", ".skp", ".sldprt",
+)  # fmt: skip
+UNREAD = "a model in a format that is not read; export it as glTF (.glb)"
+
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
@@ -160,6 +166,14 @@ def text(data: bytes) -> bytes:
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         return data.decode("utf-16", "ignore").encode()
     return data
+
+
+def decoded(data: bytes) -> str:
+    """Words of a text in UTF-8, or as programs on Windows write them, whose bytes mean nothing in UTF-8."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return "".join(bytes((byte,)).decode("cp1252", "ignore") or chr(byte) for byte in data)
 
 
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:

@@ -179,6 +179,14 @@ class SceneFile:
 
 
 @dataclass(frozen=True)
+class TakenFile:
+    """A model of a zip as a file of its own, or as a zip with its parts alone."""
+
+    name: str
+    data: bytes | memoryview
+
+
+@dataclass(frozen=True)
 class AssetInfo:
     """The answer to an upload. A mesh has no width and an image no triangles: those are None.
 

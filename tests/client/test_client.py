@@ -17,7 +17,8 @@ from PIL import Image
 
 import sunbox
 from sunbox.merge import merged
-from tests.asset_files import png, read_exr
+from tests.asset_files import OBJ, png, read_exr
+from tests.obj_files import zipped
 from tests.serving import ENDLESS, LISTENS, SCENE, SMALL, Server, wait_until
 
 GLASS = {"type": "principled", "transmission": 1, "roughness": 0}
@@ -115,6 +116,16 @@ def test_paths_are_uploaded_once(client: sunbox.Client, server: Server, tmp_path
         other.render(tmp_path / "scene.json", **SMALL)
     wait_until(lambda: server.log.read_text().count("path=/v1/assets ") > before)
     assert server.log.read_text().count("path=/v1/assets ") == before + 1
+
+
+def test_one_of_several_models_of_a_zip(client: sunbox.Client, tmp_path: Path) -> None:
+    path = tmp_path / "two.zip"
+    path.write_bytes(zipped({"a.obj": OBJ, "in b/c&d.obj": OBJ.replace(b"0 1 0", b"0 2 0")}))
+    with pytest.raises(sunbox.SunboxError, match=r"2 models, a\.obj and in b/c&d\.obj"):
+        client.upload(path)
+    scene = client.import_scene(path, entry="in b/c&d.obj")
+    (shape,) = scene["shapes"]
+    assert shape["asset"] == client.upload(path.read_bytes(), "two.zip", entry="c&d.obj")
 
 
 def test_scene_is_not_changed(client: sunbox.Client) -> None:

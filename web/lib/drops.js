@@ -6,7 +6,7 @@ export function watchDrops(page, { take, tell }) {
     if (!isFiles(event)) return;
     depth += 1;
     tell(
-      "Scenes (GLB, USDZ, JSON, a zipped OBJ), meshes (OBJ, PLY, STL), light (HDR, EXR), images and texture sets (PNG, JPEG, ZIP)",
+      "Scenes (GLB, USDZ, JSON, a zipped model), meshes (OBJ, PLY, STL), light (HDR, EXR), images and texture sets (PNG, JPEG, ZIP)",
     );
   });
   page.addEventListener("dragleave", (event) => {

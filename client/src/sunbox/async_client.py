@@ -151,21 +151,24 @@ class AsyncClient:
         difference, flip or heat also brings a picture of where they differ. Cancelled, it ends the work."""
         return await verdicts.compare(self._transport, a, b, confidence, map, settings)
 
-    async def upload(self, file: str | Path | bytes, name: str = "") -> str:
+    async def upload(self, file: str | Path | bytes, name: str = "", entry: str | None = None) -> str:
         """The id of a file on the server, from its path or its bytes; `name` tells how bytes are to be read
-        ("chair.obj"). A content is sent once."""
+        ("chair.obj"). A content is sent once. `entry` takes one of several models of a zip, by its name there."""
         if isinstance(file, bytes):
-            return await self._transport.upload(file, name)
-        return await self._transport.upload_file(Path(file))
+            return await self._transport.upload(file, name, entry)
+        return await self._transport.upload_file(Path(file), entry)
 
     async def import_scene(
-        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None
-    ) -> files.Scene:
-        """A model's file (GLB, glTF with its parts inside) as a scene's document: as it was saved, or with one of its
-        material variants, or as one of its animations has it at `time` (s). `describe` lists both."""
+        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None,
+        entry: str | None = None,
+    ) -> files.Scene:  # fmt: skip
+        """A model's file (GLB, a zip of a model and its parts) as a scene's document: as it was saved, or with one of
+        its material variants, or as one of its animations has it at `time` (s). `describe` lists both. `entry` as for
+        `upload`."""
         chosen = {"variant": variant, "animation": animation, "time": time}
         query = urlencode({name: value for name, value in chosen.items() if value is not None})
-        return dict(await self._transport.json("GET", f"/v1/assets/{await self.upload(path)}/scene?{query}"))
+        id = await self.upload(path, entry=entry)
+        return dict(await self._transport.json("GET", f"/v1/assets/{id}/scene?{query}"))
 
     async def describe(self, path: str | Path) -> dict[str, Any]:
         """The description of a file: kind, size, warnings; of a scene `variants` and `animations` (name, duration),

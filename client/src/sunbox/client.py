@@ -31,13 +31,9 @@ class Client:
     """The calls of `AsyncClient`, which has their documentation, without `await`; a context manager, too."""
 
     def __init__(
-        self,
-        url: str | None = None,
-        key: str | None = None,
-        timeout: float = TIMEOUT_S,
-        patience: float = PATIENCE_S,
-        asset_root: files.Folders = (),
-    ) -> None:
+        self, url: str | None = None, key: str | None = None, timeout: float = TIMEOUT_S,
+        patience: float = PATIENCE_S, asset_root: files.Folders = (),
+    ) -> None:  # fmt: skip
         self._client = AsyncClient(url, key, timeout, patience, asset_root)
 
     @property
@@ -110,15 +106,16 @@ class Client:
         """A verdict on whether two scenes, renders, pictures or EXR files differ. Ctrl-C ends the work."""
         return run(self._client.compare(a, b, confidence, map, **settings))
 
-    def upload(self, file: str | Path | bytes, name: str = "") -> str:
-        """The id of a file on the server, from its path or its bytes; a content is sent once."""
-        return run(self._client.upload(file, name))
+    def upload(self, file: str | Path | bytes, name: str = "", entry: str | None = None) -> str:
+        """The id of a file on the server, or of one model of a zip; a content is sent once."""
+        return run(self._client.upload(file, name, entry))
 
     def import_scene(
-        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None
-    ) -> files.Scene:
-        """A model's file (GLB, glTF with its parts inside) as a scene's document, perhaps in a pose."""
-        return run(self._client.import_scene(path, variant, animation, time))
+        self, path: str | Path, variant: str | None = None, animation: str | None = None, time: float | None = None,
+        entry: str | None = None,
+    ) -> files.Scene:  # fmt: skip
+        """A model's file (GLB, a zip of a model with its parts) as a scene's document, perhaps in a pose."""
+        return run(self._client.import_scene(path, variant, animation, time, entry))
 
     def describe(self, path: str | Path) -> dict[str, Any]:
         """The description of a file; of a scene with its `variants` and `animations`."""

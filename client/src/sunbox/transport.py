@@ -118,18 +118,23 @@ class Transport:
             if not await again.after(retry_after=pause):
                 raise error
 
-    async def upload(self, data: bytes, name: str) -> str:
+    async def upload(self, data: bytes, name: str, entry: str | None = None) -> str:
         """The id of a file's content, which is sent only where the server does not have it; `name` says how to read
-        it. Raises SunboxError."""
+        it. With `entry` that of this model of a zip. Raises SunboxError."""
+        if entry is not None:
+            return await self._sent(data, f"{quote(name)}&entry={quote(entry, safe='')}")
         id = f"sha256:{await asyncio.to_thread(lambda: hashlib.sha256(data).hexdigest())}"
         if not await self._has(id):  # asked each time: a server gives up what was not used for long
-            kind = {"content-type": "application/octet-stream"}
-            id = str((await self.request("POST", f"/v1/assets?filename={quote(name)}", data, kind)).json()["id"])
+            id = await self._sent(data, quote(name))
         return id
 
-    async def upload_file(self, path: Path) -> str:
+    async def _sent(self, data: bytes, query: str) -> str:
+        kind = {"content-type": "application/octet-stream"}
+        return str((await self.request("POST", f"/v1/assets?filename={query}", data, kind)).json()["id"])
+
+    async def upload_file(self, path: Path, entry: str | None = None) -> str:
         """As `upload`. Raises OSError, SunboxError."""
-        return await self.upload(await asyncio.to_thread(path.read_bytes), path.name)
+        return await self.upload(await asyncio.to_thread(path.read_bytes), path.name, entry)
 
     async def uploaded(self, scene: Any, pointer: str = "/scene") -> files.Scene:
         """A scene's document for the server: the files that it names by path are there. `pointer`: where it stands in

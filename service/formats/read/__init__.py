@@ -1,5 +1,8 @@
 """Readers of single formats and importers of whole scenes, which run in the parsing child.
 
+archive      the files of a zip, whose sizes are bounded before any is unpacked
+references   finds the files that others name
+zips         a zip is what is in it
 gltf         glTF
 obj_mesh     OBJ: vertices and faces
 obj          OBJ files with materials and textures

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from service.formats.formats import decoded
 from service.formats.read.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
@@ -148,7 +149,7 @@ def _named(
         if keyword in NAMING:
             given = rest[0] if rest else b""
             given = COMMENT.sub(b"", given) if keyword == b"s" else given
-            name = given.decode("utf-8", "replace").strip()
+            name = decoded(given).strip()
             named.append(Named(keyword.decode(), name, int(numbers[row]), int(before[row])))
         elif keyword not in SILENT:
             unread.setdefault(keyword[:40].decode("utf-8", "replace"), []).append(int(numbers[row]))

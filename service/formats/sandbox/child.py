@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from service.formats.errors import MissingExtra, ParseError
+from service.formats.read.foreign import assimp
 from service.formats.read.measured import transfer
 from service.formats.sandbox.wire import Pieces, publish, receive, send
 from service.formats.types import (
@@ -25,6 +26,7 @@ from service.formats.types import (
     Pose,
     RenderedPicture,
     SceneFile,
+    TakenFile,
 )
 from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
@@ -64,12 +66,18 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
     try:
         with bounded(request["memory"], limits.seconds):
             parsed = _parse(
-                request["format"], source, limits, request["whole"], Pose(**request["pose"]), request["layer"]
+                request["format"],
+                source,
+                limits,
+                request["whole"],
+                Pose(**request["pose"]),
+                request["layer"],
+                request["entry"],
             )
             arrays, facts = _arrays(parsed)
             del parsed
             fd, table = publish(arrays)
-            return {"arrays": table, **facts}, fd
+            return {"arrays": table, "is_spent": assimp.is_loaded(), **facts}, fd
     except ParseError as error:
         reply = {"error": error.detail[:2000], "pointer": error.pointer[:1000]}
         return reply | {"is_missing": isinstance(error, MissingExtra)}, -1
@@ -82,12 +90,14 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
 
 
-Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture | TakenFile
 
 
-def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose, layer: str) -> Parsed:
+def _parse(
+    format: str, source: int, limits: AssetLimits, whole: bool, pose: Pose, layer: str, entry: str | None
+) -> Parsed:
     """With `whole` a scene file is read with its materials, lights and camera, else only its triangles; and a picture
-    as a render that was written with every layer."""
+    as a render that was written with every layer. With `entry` a model of a zip becomes a file of its own."""
     from service.formats.formats import FOREIGN
     from service.formats.read.cube import parse_cube
     from service.formats.read.foreign.importer import read_foreign_scene
@@ -96,7 +106,8 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
     from service.formats.read.measured.adaptive import parse_adaptive
     from service.formats.read.measured.merl import parse_merl
     from service.formats.read.rendered import parse_rendered
-    from service.formats.sandbox.readers import parse_mesh, parse_mtlx, parse_zip, read_usd_scene
+    from service.formats.read.zips.importer import read_zip, taken
+    from service.formats.sandbox.readers import parse_mesh, parse_mtlx, read_usd_scene
 
     size = os.fstat(source).st_size
     if not size:
@@ -112,15 +123,17 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool, pose: Pos
         return parse_merl(mapped)
     if format == "bsdf":
         return parse_adaptive(mapped, limits)
+    if entry is not None:
+        return TakenFile(*taken(mapped, limits, entry))
     if not whole:
         return parse_mesh(format, mapped, limits)
     if format == "mtlx":
         return parse_mtlx(mapped, limits)
     if format == "usd":
-        return read_usd_scene(mapped, limits)
+        return read_usd_scene(mapped, limits, pose)
     if format in FOREIGN:
         return read_foreign_scene(format, mapped, limits, pose)
-    return parse_zip(mapped, limits) if format == "zip" else read_scene(mapped, limits, pose)
+    return read_zip(mapped, limits, pose) if format == "zip" else read_scene(mapped, limits, pose)
 
 
 def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
@@ -130,6 +143,8 @@ def _arrays(parsed: Parsed) -> tuple[dict[str, Pieces], dict[str, Any]]:
         text = json.dumps(vars(parsed) | {"parts": parts, "animations": animations}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
         return {"scene": [np.frombuffer(text, np.uint8)], **({"files": files} if files else {})}, {}
+    if isinstance(parsed, TakenFile):
+        return {"taken": [np.frombuffer(parsed.data, np.uint8)]}, {"name": parsed.name}
     if isinstance(parsed, RenderedPicture):
         facts = {name: value for name, value in vars(parsed).items() if name != "layers"}
         return {"layers": [parsed.layers]}, facts

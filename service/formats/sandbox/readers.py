@@ -1,27 +1,24 @@
 """Files -> what the rest may trust, in the parsing process. Meshes are arrays that are finite, in range and of
-bounded size; a zip is what is in it: an OBJ with its materials, MaterialX with its images, or images that make
-materials by their names; USD is read where its extra is installed.
+bounded size; a zip is what is in it; USD is read where its extra is installed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.util import find_spec
-from types import ModuleType
 
 import numpy as np
 
-from service.formats.errors import MissingExtra, ParseError
-from service.formats.formats import FOREIGN, PACKAGES, text
+from service.formats.errors import ParseError
+from service.formats.formats import FOREIGN, text
 from service.formats.read.bad_elements import mend
-from service.formats.read.materialx.importer import ALONE, SUFFIX, read_materialx
+from service.formats.read.materialx.importer import ALONE, read_materialx
 from service.formats.read.mesh_checks import mesh_oddities
-from service.formats.read.obj.archive import Archive
-from service.formats.read.obj.importer import holds_ply, read_obj_scene, read_ply_scene
 from service.formats.read.raw_mesh import Numbers, RawMesh, unit_colors, unit_normals
+from service.formats.read.references import Finder
 from service.formats.read.stl import read_stl
-from service.formats.read.texture_sets.importer import read_texture_sets
-from service.formats.types import AssetLimits, Floats, Indices, MeshData, SceneFile
+from service.formats.read.zips.contents import START_OF_ZIP
+from service.formats.read.zips.importer import read_zip, read_zip_as_mesh, usd_importer
+from service.formats.types import AssetLimits, Floats, Indices, MeshData, Pose, SceneFile
 
 
 def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
@@ -69,54 +66,25 @@ def _mtlx(data: memoryview, limits: AssetLimits) -> RawMesh:
     raise ParseError("it holds materials; a mesh or an image is needed here")
 
 
-def _zip(data: memoryview, limits: AssetLimits) -> RawMesh:
-    from service.formats.read.obj.importer import read_zipped_mesh
-
-    return read_zipped_mesh(data, limits)
-
-
-def read_usd_scene(data: memoryview, limits: AssetLimits) -> SceneFile:
-    """Raises ParseError, MissingExtra."""
-    found: SceneFile = _importer().read_scene(data, limits)
+def read_usd_scene(data: memoryview, limits: AssetLimits, pose: Pose | None = None) -> SceneFile:
+    """A layer, or a zip that begins with one. Raises ParseError, MissingExtra."""
+    if bytes(data[:4]) == START_OF_ZIP:
+        return read_zip(data, limits, pose)
+    found: SceneFile = usd_importer().read_scene(data, limits)
     return found
 
 
 def read_usd_mesh(data: memoryview, limits: AssetLimits) -> RawMesh:
     """Raises ParseError, MissingExtra."""
-    found: RawMesh = _importer().read_merged(data, limits)
+    if bytes(data[:4]) == START_OF_ZIP:
+        return read_zip_as_mesh(data, limits)
+    found: RawMesh = usd_importer().read_merged(data, limits)
     return found
-
-
-def _importer() -> ModuleType:
-    package, module = PACKAGES["usd"]
-    if find_spec(module) is None:
-        raise MissingExtra(f"USD files need {package} on the server")
-    from service.formats.read.usd import importer
-
-    return importer
-
-
-def parse_zip(data: memoryview, limits: AssetLimits) -> SceneFile:
-    """Raises ParseError."""
-    archive = Archive(data, limits.max_file)
-    if any(name.lower().endswith(".obj") for name in archive.names):
-        return read_obj_scene(data, limits)
-    if any(name.lower().endswith(SUFFIX) for name in archive.names):
-        try:
-            return read_materialx(archive.names, archive.read, limits)
-        except MissingExtra as missing:
-            try:
-                return read_texture_sets(archive, limits)  # its names may say as much
-            except ParseError:
-                raise missing from None
-    if holds_ply(archive):
-        return read_ply_scene(archive, limits)
-    return read_texture_sets(archive, limits)
 
 
 def parse_mtlx(data: memoryview, limits: AssetLimits) -> SceneFile:
     """A `.mtlx` file that came without images. Raises ParseError."""
-    return read_materialx([ALONE], lambda name: bytes(data), limits)
+    return read_materialx([ALONE], Finder([ALONE]), lambda name: bytes(data), limits)
 
 
 def _foreign(format: str) -> Callable[[memoryview, AssetLimits], RawMesh]:
@@ -134,7 +102,7 @@ MESH_READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "stl": read_stl,
     "glb": _gltf,
     "gltf": _gltf,
-    "zip": _zip,
+    "zip": read_zip_as_mesh,
     "mtlx": _mtlx,
     "usd": read_usd_mesh,
     **{format: _foreign(format) for format in FOREIGN},

@@ -27,6 +27,7 @@ from service.formats.types import (
     RenderedPicture,
     SceneFile,
     ScenePart,
+    TakenFile,
 )
 from service.system.child_processes import Child, Children, Closed, signal_name
 from service.system.confined import Rights
@@ -56,7 +57,7 @@ CRASHES = {
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
 
-Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture
+Parsed = MeshData | ImageData | LutData | MeasuredData | SceneFile | RenderedPicture | TakenFile
 
 # The type of each array of a mesh, and the shape of its rows.
 MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
@@ -125,18 +126,30 @@ class Sandbox:
         assert isinstance(parsed, RenderedPicture)
         return parsed
 
+    def take(self, format: str, source: bytes | int, entry: str) -> tuple[str, bytes | memoryview]:
+        """A model of a zip as a file of its own, and the name of that. Raises ParseError."""
+        parsed = self._bounded(format, source, True, entry=entry)
+        assert isinstance(parsed, TakenFile)
+        return parsed.name, parsed.data
+
     def _bounded(
-        self, format: str, source: bytes | int, whole: bool, pose: Pose | None = None, layer: str = ""
+        self,
+        format: str,
+        source: bytes | int,
+        whole: bool,
+        pose: Pose | None = None,
+        layer: str = "",
+        entry: str | None = None,
     ) -> Parsed:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
             with self._room.taken():
-                return self._parse(format, fd, whole, pose or Pose(), layer)
+                return self._parse(format, fd, whole, pose or Pose(), layer, entry)
         finally:
             if isinstance(source, bytes):
                 os.close(fd)
 
-    def _parse(self, format: str, fd: int, whole: bool, pose: Pose, layer: str) -> Parsed:
+    def _parse(self, format: str, fd: int, whole: bool, pose: Pose, layer: str, entry: str | None) -> Parsed:
         size = os.fstat(fd).st_size
         if size > self.limits.max_file:
             raise ParseError(f"{size} bytes; {self.limits.max_file} are allowed")
@@ -146,19 +159,19 @@ class Sandbox:
             if format == "zip":
                 size = min(USUAL_RATIO * size, self.limits.max_file)
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
-            worst += USD_BYTES if format == "usd" or format in FOREIGN else 0
+            worst += USD_BYTES if format in ("usd", "zip", *FOREIGN) else 0
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)
         caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}
         request = {
             "format": format, "whole": whole, "pose": asdict(pose), "memory": memory, "limits": asdict(limits),
-            "caps": caps, "layer": layer,
+            "caps": caps, "layer": layer, "entry": entry,
         }  # fmt: skip
         try:
             with (self._cad_children if format == "step" else self.children).one() as child:
                 reply, result = _ask(child, request, fd, limits)
                 # An error may have been an attempt; and what Assimp has read is not freed.
-                child.is_spent = "error" in reply or format in FOREIGN
+                child.is_spent = "error" in reply or reply.get("is_spent") is True
         except Closed:
             raise ParseError("the service is shutting down") from None
         return _result(reply, result)
@@ -221,6 +234,8 @@ def _result(reply: dict[str, Any], fd: int) -> Parsed:
         arrays = adopt(fd, reply["arrays"])
     finally:
         os.close(fd)
+    if "taken" in arrays:
+        return TakenFile(str(reply["name"]), arrays["taken"].data)
     if "pixels" in arrays:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])), tuple(map(str, reply["layers"])))
     if "lut" in arrays:

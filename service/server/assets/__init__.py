@@ -3,6 +3,7 @@
 store         uploaded assets
 folder        the files of the store, each written whole or not at all, and the disk space of all
 integrity     whether the bytes on the disk still match their hash
+entries       one of several models in a zip, as a file of its own
 local_files   assets that are files beside a scene
 posing        a scene's file with other materials, or at a time of its animation
 """

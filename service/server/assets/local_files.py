@@ -14,6 +14,8 @@ from service.formats.types import AssetLimits, ImageData, LutData, MeasuredData,
 from service.problems import AssetError, NotFound
 from service.server.assets.store import AssetStore
 
+MOST_LISTED = 10_000  # files of a folder; as many as a zip may hold
+
 
 class FileAssets:
     """Files inside `folder` or one of `roots`, links followed first; a `sha256:` id leads to `fallback`.
@@ -64,6 +66,17 @@ class FileAssets:
     def holds(self, ref: str) -> bool:
         """True if such a file exists. Raises AssetError for a path that may not be read."""
         return _exists(self._find(ref))
+
+    def listed(self) -> list[str]:
+        """The paths of all files in these folders, without links; none of folders that hold too many to look at."""
+        found: dict[str, None] = {}
+        for base in self._bases:
+            for folder, _, names in os.walk(base):
+                if len(found) + len(names) > MOST_LISTED:
+                    return []
+                paths = (Path(folder, name) for name in names)
+                found |= {path.relative_to(base).as_posix(): None for path in paths if not path.is_symlink()}
+        return list(found)
 
     def add(self, ref: str) -> None:
         """Copy a file into the store. Raises AssetError, Unavailable."""

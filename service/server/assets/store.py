@@ -29,6 +29,7 @@ from service.formats.types import (
     asset_limits,
 )
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
+from service.server.assets.entries import taken
 from service.server.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
 from service.server.assets.integrity import Integrity, damaged
 from service.system.confined import Rights
@@ -39,10 +40,9 @@ log = logging.getLogger(__name__)
 
 ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = (
-    "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures, or of images that "
-    "make materials by their names; USD; MaterialX; FBX, COLLADA, 3DS, X3D, 3MF and STEP; "
-    "EXR, Radiance HDR, PNG, JPEG and WebP images; .cube tables of colours; measured "
-    "reflection as MERL .binary and RGL .bsdf files"
+    "OBJ, PLY, STL, glTF and GLB meshes; USD; MaterialX; FBX, COLLADA, 3DS, X3D, 3MF and STEP; ZIP archives of one "
+    "of these with its parts, or of images that make materials by their names; EXR, Radiance HDR, PNG, JPEG and WebP "
+    "images; .cube tables of colours; measured reflection as MERL .binary and RGL .bsdf files"
 )
 NO_SCENES: dict[Kind, str] = {
     "image": "is an image",
@@ -94,12 +94,17 @@ class AssetStore:
         filename: str | None = None,
         room: Room | None = None,
         title: str | None = None,
+        entry: str | None = None,
     ) -> AssetInfo:
         """Parse the bytes, and store them; they replace damaged ones of the same id.
 
-        `room` is used instead of the store's own; errors call a scene's file `title`. Raises UnsupportedMedia,
-        AssetError, Unavailable, and the exceptions of `room`.
+        `room` is used instead of the store's own; errors call a scene's file `title`. With `entry` the asset is that
+        model of a zip, without all that is no part of it. Raises UnsupportedMedia, AssetError, Unavailable, and the
+        exceptions of `room`.
         """
+        if entry is not None:
+            filename, data = taken(self.loader.sandbox, data, entry, content_type, filename, title)
+            content_type = None
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
         if (
@@ -123,11 +128,14 @@ class AssetStore:
         return info
 
     def scene(self, id: str) -> Imported:
-        """A glTF file, a zipped OBJ or a mesh as a document whose references are assets here.
+        """A glTF file, a zipped model or a mesh as a document whose references are assets here.
 
         Raises NotFound, AssetError, Unavailable.
         """
         info = self.info(id)
+        # An older version recorded some zips of models as materials.
+        if info.kind == "materials" and (imported := self.materials(id)).kind == "scene":
+            return imported
         if info.kind in NO_SCENES:
             what = NO_SCENES[info.kind]
             raise NotFound(f"{id[:100]} {what}: only meshes and scene files can be shown as a scene")

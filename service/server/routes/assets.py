@@ -101,12 +101,20 @@ ASSET_FILE: Responses = {
 @router.post(
     "",
     status_code=201,
-    summary="Upload a mesh, an image, a scene (glTF, or a zip of an OBJ with its materials), or a zip of textures",
+    summary="Upload a mesh, an image, a scene (glTF, USD, or a zip of a model with its parts), or a zip of textures",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
     responses=answers.shaped(Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
 )
-async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
+async def upload(
+    request: Request,
+    filename: Annotated[str | None, Query(max_length=255)] = None,
+    entry: Annotated[
+        str | None, Query(max_length=1024, description="Of a zip that holds several models: the one to take.")
+    ] = None,
+) -> dict[str, Any]:
+    """A zip is what is in it: a model with its parts, MaterialX with its images, or images whose names say what they
+    are. With `entry` the asset is that model without all that is no part of it, and so is its id."""
     kind = request.headers.get("content-type", "")
     if kind.lower().startswith("multipart/"):
         async for _ in request.stream():  # to its end, so that its sender reads the answer
@@ -118,7 +126,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
 
     def add() -> AssetInfo:
         with file:  # closed in this thread: a cancelled request does not wait for it
-            info = storage.assets.add(file, kind, filename, partial(storage.shares.room, owner))
+            info = storage.assets.add(file, kind, filename, partial(storage.shares.room, owner), entry=entry)
         storage.shares.uploaded(owner, storage.assets.parts(info))
         return info
 
@@ -156,8 +164,8 @@ class PoseQuery(BaseModel):
 
 @router.get(
     "/{id}/scene",
-    summary="A glTF file, a zipped OBJ or a mesh as a scene document with a camera that shows it; of a picture that "
-    "Sunbox made the scene in its metadata",
+    summary="A glTF file, a zipped model or a mesh as a scene document with a camera that shows it; of a picture "
+    "that Sunbox made the scene in its metadata",
     response_class=JSONResponse,
     responses=answers.SCENE_DOCUMENT | answers.problems(404, 422),
 )

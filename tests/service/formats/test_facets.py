@@ -9,7 +9,7 @@ import pytest
 
 from service.document import parse_scene
 from service.formats import MeshData
-from service.formats.read.obj.importer import read_obj_scene
+from service.formats.read.zips.importer import read_zip
 from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 from service.pack import pack
@@ -97,7 +97,7 @@ def test_the_document_has_the_last_word(name: str) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_an_imported_obj_is_shaded_as_the_mesh_alone(name: str) -> None:
     text, expected = CASES[name]
-    scene = read_obj_scene(zipped({"m.obj": text}), LIMITS)
+    scene = read_zip(zipped({"m.obj": text}), LIMITS)
     (shape,) = scene.document["shapes"]
     own = {"smooth": shape["smooth"]} if "smooth" in shape else {}
     found = ridge(parse_mesh("ply", memoryview(bytes(scene.parts[0].data)), LIMITS), **own)

@@ -16,6 +16,7 @@ from service.formats.errors import MissingExtra
 from service.formats.formats import sniff
 from service.formats.read.materialx import values
 from service.formats.read.materialx.importer import read_materialx
+from service.formats.read.references import Finder
 from service.formats.scene_import import Imported
 from service.formats.types import AssetLimits
 from service.problems import AssetError, NotProvided
@@ -280,9 +281,9 @@ def test_what_leads_out_or_is_broken_is_refused(store: AssetStore, text: bytes, 
 def test_images_outside_of_the_upload_are_not_opened(store: AssetStore, name: str) -> None:
     image = node("image", "img", "color3", value("file", name, "filename"), value("default", [0.5, 0.25, 0.125]))
     shader = surface("gltf_pbr", from_graph("base_color", "out"))
-    imported = taken(store, {"a/m.mtlx": mtlx(graph(image, out="img color3"), shader), "b/a.png": make.png(NOISY)})
+    imported = taken(store, {"a/m.mtlx": mtlx(graph(image, out="img color3"), shader), "b/c.png": make.png(NOISY)})
     assert material(imported)["base_color"] == [0.5, 0.25, 0.125]
-    assert losses(imported) == {"NG/img"}
+    assert losses(imported) == {"NG/img", "b/c.png"}, "and the image that the zip has is used by nothing"
 
 
 def test_a_graph_that_takes_too_long_is_made_smaller_or_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -300,14 +301,14 @@ def test_a_graph_that_takes_too_long_is_made_smaller_or_left_out(monkeypatch: py
     made = graph(*nodes, out="n5 float")
     shaders = [surface("gltf_pbr", from_graph("roughness", "out", "float"), name=f"M{k}") for k in range(3)]
     text = mtlx(made, *shaders)
-    file = read_materialx(["a.mtlx"], lambda name: text, AssetLimits())
+    file = read_materialx(["a.mtlx"], Finder(["a.mtlx"]), lambda name: text, AssetLimits())
     assert len(file.document["materials"]) == 3
     (part,) = file.parts
     assert make.read_png(bytes(part.data)).shape[0] < 256
     deep = [node("add", f"n{k}", "float", wire("in1", f"n{k + 1}", "float")) for k in range(400)]
     shader = surface("gltf_pbr", from_graph("roughness", "out", "float"))
     text = mtlx(graph(*deep, node("constant", "n400", "float", value("value", 0.5)), out="n0 float"), shader)
-    (warning,) = read_materialx(["a.mtlx"], lambda name: text, AssetLimits()).warnings
+    (warning,) = read_materialx(["a.mtlx"], Finder(["a.mtlx"]), lambda name: text, AssetLimits()).warnings
     assert "within each other" in warning["detail"]
 
 
@@ -321,7 +322,7 @@ def test_a_mtlx_in_a_texture_set_wins_and_two_files_are_told_apart(store: AssetS
     )
     both = taken(store, {**files, "b/other.mtlx": other})
     assert list(both.document["materials"]) == ["Oak", "Oak 2"]
-    assert losses(both) == {"b/other.mtlx/SOak/occlusion"}
+    assert losses(both) == {"b/other.mtlx/SOak/occlusion", "Oak_Roughness.png"}
 
 
 def test_it_is_served_and_a_file_is_no_mesh(server: Server) -> None:
@@ -349,7 +350,7 @@ def test_without_the_package_it_is_refused_by_its_extras_name(monkeypatch: pytes
     try:
         assert formats.missing()["mtlx"] == "sunbox-server[materialx]"
         with pytest.raises(MissingExtra, match=r"sunbox-server\[materialx\]"):
-            read_materialx(["a.mtlx"], lambda name: b"", AssetLimits())
+            read_materialx(["a.mtlx"], Finder(["a.mtlx"]), lambda name: b"", AssetLimits())
     finally:
         monkeypatch.undo()
         formats.missing.cache_clear()

@@ -15,8 +15,8 @@ import pytest
 from service.config import Config
 from service.formats import AssetInfo
 from service.formats.errors import ParseError
-from service.formats.read.obj import archive, importer
-from service.formats.read.obj.importer import read_obj_scene
+from service.formats.read import archive
+from service.formats.read.zips.importer import read_zip
 from service.formats.scene_import import take_apart
 from service.formats.types import AssetLimits
 from service.problems import AssetError
@@ -46,7 +46,8 @@ def imported(store: AssetStore, files: dict[str, bytes | str]) -> tuple[dict[str
 
 def material(store: AssetStore, text: str, obj: str = TEXTURED) -> tuple[dict[str, Any], list[str]]:
     """What one material becomes, and the warnings."""
-    document, _, details = imported(store, {"a.obj": obj, "m.mtl": "newmtl m\n" + text, **IMAGES})
+    images = {name: image for name, image in IMAGES.items() if name in text}
+    document, _, details = imported(store, {"a.obj": obj, "m.mtl": "newmtl m\n" + text, **images})
     (found,) = document["materials"].values()
     return found, details
 
@@ -133,7 +134,7 @@ def test_statements_become_parameters(store: AssetStore, text: str, expected: di
         ("norm normals.png\ndisp grey.png", "the normal map shows them"),
         ("refl -type sphere grey.png", "reflection maps"),
         ("map_Kd lost.png", "the texture 'lost.png' is not there"),
-        ("map_Kd C:\\\\pictures\\\\lost.png", "is not there beside the library"),
+        ("map_Kd C:\\\\pictures\\\\lost.png", "is not there; the material is shown without it"),
         ("map_Kd ../lost.png", "the texture '../lost.png' is not there"),
         ("map_Kd m.mtl", "is not in a supported format"),
         ("map_Kd -cc on grey.png", "the option -cc is not supported"),
@@ -272,7 +273,7 @@ def test_nonsense_is_a_scene_or_is_refused() -> None:
         broken = "m.mtl" if rng.random() < 0.7 else "a.obj"
         files[broken] = mutated(files[broken].decode(), rng)
         try:
-            take_apart(read_obj_scene(importer.zipped(files), AssetLimits()), lambda part: "sha256:" + "0" * 64)
+            take_apart(read_zip(archive.zipped(files), AssetLimits()), lambda part: "sha256:" + "0" * 64)
             scenes += 1
         except ParseError:
             pass
@@ -326,8 +327,8 @@ def bomb(entries: int = 1) -> bytes:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (zipped({"a.txt": "hello"}), "holds no OBJ file"),
-        (zipped({"a.obj": OBJ, "b/c.OBJ": OBJ}), "holds 2 OBJ files"),
+        (zipped({"a.txt": "hello"}), "the zip holds a.txt; no model"),
+        (zipped({"a.obj": OBJ, "b/c.OBJ": OBJ}), "the zip holds 2 models, a.obj and b/c.OBJ; choose one by its name"),
         (zipped({"/etc/a.obj": OBJ}), "leads out of its folder"),
         (zipped({"b/../../a.obj": OBJ}), "leads out of its folder"),
         (renamed(zipped({"a.obj": OBJ, "C__x": ""}), "C__x", "C:/x"), "leads out of its folder"),

@@ -94,13 +94,16 @@ def test_a_zip_is_imported(folder: Path, tmp_path: Path) -> None:
 def test_files_outside_the_folder_are_not_read(
     folder: Path, tmp_path: Path, reference: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A path that leaves the folder is refused; one from another machine is looked for by its name alone."""
+    """A path that leaves the folder is refused; one from another machine is looked for by its name alone, inside."""
     (tmp_path / "green.png").write_bytes(GREEN)
     (folder / "parts" / "m.mtl").write_text(GLOWING.format(reference))
     ended = main(["import", str(folder / "m.obj"), "-o", str(tmp_path / "s.json")])
     told = capsys.readouterr().err
     if reference.startswith("/"):
-        assert ended == 0 and "is not there beside the library" in told
+        assert ended == 0 and "'parts/images/green.png', the only file of that name, is used" in told
+        (folder / "parts" / "images" / "green.png").unlink()
+        assert main(["import", str(folder / "m.obj"), "-o", str(tmp_path / "s.json")]) == 0
+        assert "the texture '/outside/green.png' is not there" in capsys.readouterr().err
         return
     assert ended == 2 and "leaves the scene's folder; --asset-root DIR allows another one" in told
     assert not (tmp_path / "s.json").exists()

@@ -12,7 +12,8 @@ from service.cli.program import main
 from service.formats import MeshData
 from service.formats.errors import ParseError
 from service.formats.formats import sniff
-from service.formats.sandbox.readers import parse_mesh, parse_zip
+from service.formats.read.zips.importer import read_zip
+from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 from tests.asset_files import png
 from tests.obj_files import zipped
@@ -207,10 +208,10 @@ def test_a_texture_that_does_not_come_along_is_told() -> None:
 
 
 def test_a_zip_with_its_texture_is_a_scene() -> None:
-    scene = parse_zip(memoryview(zipped({"m/a.ply": TEXTURED, "m/my oak.png": OAK})), AssetLimits())
+    scene = read_zip(memoryview(zipped({"m/a.ply": TEXTURED, "m/my oak.png": OAK})), AssetLimits())
     assert scene.document["materials"]["my oak.png"]["albedo"]["texture"] in scene.document["textures"]
     assert scene.triangles == 2 and not scene.warnings and len(scene.parts) == 2
-    without = parse_zip(memoryview(zipped({"a.ply": TEXTURED})), AssetLimits())
+    without = read_zip(memoryview(zipped({"a.ply": TEXTURED})), AssetLimits())
     assert without.triangles == 2 and "the texture 'my oak.png' is not there" in without.warnings[0]["detail"]
 
 
@@ -219,7 +220,7 @@ def test_textures_by_number() -> None:
     two = two.replace("float texcoord\n", "float texcoord\nproperty int texnumber\n")
     first, second, *_ = two.splitlines()[-2:]
     two = two.replace(first, first + " 1").replace(second, second + " -1")
-    scene = parse_zip(memoryview(zipped({"a.ply": two, "a.png": OAK, "my oak.png": OAK})), AssetLimits())
+    scene = read_zip(memoryview(zipped({"a.ply": two, "a.png": OAK, "my oak.png": OAK})), AssetLimits())
     assert sorted(scene.document["materials"]) == ["default", "my oak.png"]
 
 

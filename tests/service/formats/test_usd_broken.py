@@ -12,6 +12,7 @@ import pytest
 
 from service.formats.cache import refused
 from service.formats.errors import MissingExtra, ParseError
+from service.formats.read.zips import importer as zips
 from service.formats.sandbox import readers
 from service.formats.types import AssetLimits
 from service.problems import ANSWERS, AssetError, NotProvided
@@ -73,8 +74,9 @@ def test_layers_are_known_by_their_bytes_and_other_files_are_told(store: AssetSt
 
     door = {"parts/door": usda(mesh("Door")), "a.png": PNG(np.zeros((1, 1, 3), np.uint8))}
     found = store.scene(store.add(usdz({"a.usda": of("parts/door"), **door})).id)
-    assert {shape["name"] for shape in found.document["shapes"]} == {"Own", "P"} and not found.warnings
-    found = store.scene(store.add(usdz({"a.usda": of("a.png"), **door})).id)
+    (told,) = found.warnings
+    assert {shape["name"] for shape in found.document["shapes"]} == {"Own", "P"} and "not used" in told["detail"]
+    found = store.scene(store.add(usdz({"a.usda": of("a.png"), "a.png": door["a.png"]})).id)
     (told,) = found.warnings
     assert "'a.png'" in told["detail"] and "no USD layer" in told["detail"]
 
@@ -148,7 +150,7 @@ def test_broken_binary_layers_end_a_child_at_most(store: AssetStore, tmp_path: P
 
 def test_without_the_extra_the_refusal_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr(readers, "find_spec", lambda name: None)
+    monkeypatch.setattr(zips, "find_spec", lambda name: None)
     with pytest.raises(MissingExtra) as caught:
         readers.read_usd_scene(memoryview(usda(mesh("Sign"))), AssetLimits())
     answer = refused("the USD file", caught.value)

@@ -124,6 +124,11 @@ def _library() -> ctypes.CDLL:
     return library
 
 
+def is_loaded() -> bool:
+    """True if a file was read in this process: what that took is not freed."""
+    return _library.cache_info().currsize > 0
+
+
 def converted(format: str, data: bytes, find: Find) -> Glb:
     """The file in metres with +Y up. `find` gives the files beside it, by the names that it has for them. Raises
     ParseError, MissingExtra."""

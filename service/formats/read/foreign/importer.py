@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from service.formats.read.archive import Archive
 from service.formats.read.foreign import assimp, cad
 from service.formats.read.foreign.glb import Find, Glb
 from service.formats.read.gltf.importer import read_scene
@@ -21,6 +22,24 @@ def read_foreign_scene(
     found = read_scene(file.written(), limits, pose)
     notes = [{"pointer": "", "detail": detail} for detail in dict.fromkeys(file.warnings)]
     return replace(found, warnings=[*notes, *found.warnings])
+
+
+def read_zipped_foreign(
+    archive: Archive, path: str, format: str, limits: AssetLimits, pose: Pose | None = None
+) -> SceneFile:
+    """The scene of the file at this path of a zip, with the images there. Raises ParseError, MissingExtra."""
+    remarks = dict[str, None]()
+
+    def find(name: str) -> bytes | None:
+        found = archive.finder.find(path, name)
+        if found is None:
+            return None
+        remarks.update({found.remark: None} if found.remark else {})
+        return archive.read(found.path)
+
+    scene = read_foreign_scene(format, memoryview(archive.read(path)), limits, pose, find)
+    notes = [{"pointer": path.rpartition("/")[2][:300], "detail": detail} for detail in remarks]
+    return replace(scene, warnings=[*notes, *scene.warnings])
 
 
 def read_foreign_mesh(format: str, data: memoryview, limits: AssetLimits) -> RawMesh:

@@ -6,6 +6,7 @@ normalised positions as integers, and skips triangle fans.
 importer              a file -> a scene's document with its meshes and images as parts
 merged_mesh           a file -> one mesh
 document              the file: its JSON, buffers, views and limits
+beside                the files of a zip to which its URIs lead
 json_view             a place in the JSON, with its values by type and errors that name it
 extensions            which extensions are supported, and the warnings about the others
 accessors             accessors -> arrays

@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 import math
+import re
 import struct
 from typing import Any
 from urllib.parse import unquote_to_bytes
@@ -15,12 +16,14 @@ import numpy.typing as npt
 
 from service.formats.errors import ParseError
 from service.formats.read.gltf import meshopt_views
+from service.formats.read.gltf.beside import Beside
 from service.formats.read.gltf.extensions import check_required
 from service.formats.read.gltf.json_view import JsonView, shown, whole
 from service.formats.types import AssetLimits
 from service.problems import escaped
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+DATA = re.compile(r"\s*data:", re.IGNORECASE)  # schemes have no case
 MOST_ITEMS = 1 << 20  # items of one kind, which bounds the time to read an untrusted file
 
 Array = npt.NDArray[Any]
@@ -30,8 +33,9 @@ Bytes = npt.NDArray[np.uint8]
 class GltfDocument:
     """A glTF file; `root` is its JSON. Methods raise ParseError where the file refers to something that it lacks."""
 
-    def __init__(self, data: bytes | memoryview, limits: AssetLimits) -> None:
-        self.limits = limits
+    def __init__(self, data: bytes | memoryview, limits: AssetLimits, beside: Beside | None = None) -> None:
+        """`beside`: the files around it, to which it may refer."""
+        self.limits, self._beside = limits, beside
         view = memoryview(data)
         binary = bytes(view[:4]) == b"glTF"
         text, self._binary = _chunks(view) if binary else (view, None)
@@ -45,6 +49,9 @@ class GltfDocument:
         if least != "2.0":
             raise ParseError(f"glTF 2.0 is supported; the file needs {shown(least)}", "/asset/minVersion")
         check_required(self.root)
+        if beside is not None:
+            items = (item for kind in ("buffers", "images") for item in self.root.objects(kind))
+            beside.take(uri for item in items if (uri := item.text("uri", "")) and not DATA.match(uri))
 
     def count(self, kind: str) -> int:
         return len(self.root.array(kind))
@@ -84,7 +91,13 @@ class GltfDocument:
         """The bytes of an image as it is stored."""
         if "bufferView" in place:
             return self.view(place)[0].tobytes()
-        return embedded(place).tobytes()
+        return self._named(place).tobytes()
+
+    def lacks(self, place: JsonView) -> str:
+        """The reference of an image to a file that is not there, among the files around this one; else nothing."""
+        uri = place.text("uri", "")
+        is_lost = self._beside is not None and uri and not DATA.match(uri) and self._beside.find(uri) is None
+        return uri if is_lost else ""
 
     def _buffer(self, source: JsonView) -> Bytes:
         place = self.follow(source, "buffer", "buffers")
@@ -92,31 +105,55 @@ class GltfDocument:
         if index not in self._buffers:
             length = place.whole("byteLength")
             binary = self._binary if index == 0 and "uri" not in place else None
-            data = embedded(place) if binary is None else np.frombuffer(binary, np.uint8)
+            data = self._named(place) if binary is None else np.frombuffer(binary, np.uint8)
             if length > len(data):
                 raise place.error("byteLength", f"promises {length} bytes and has {len(data)}: the file is cut off")
             self._buffers[index] = data
         return self._buffers[index]
 
+    def _named(self, place: JsonView) -> Bytes:
+        """The bytes of a `data:` URI, or of the file that a URI leads to."""
+        uri = place.text("uri")
+        if not uri:
+            extensions = place.object("extensions")
+            names = sorted(extensions.value) if extensions else []
+            which = f": its data are there in compressed form only ({names[0][:60]})" if names else ""
+            raise place.error("uri", f"is missing{which}")
+        start = DATA.match(uri)
+        if start is not None:
+            return _embedded(uri[start.end() :], place)
+        if self._beside is None:
+            how = "upload a zip of the model and its files, or save the model as a GLB"
+            raise place.error("uri", f"refers to another file, {shown(uri)}, which is not part of this one; {how}")
+        found = self._beside.find(uri)
+        if found is None:
+            raise place.error("uri", f"refers to {shown(uri)}, which is not there: {self._beside.shown}")
+        return np.frombuffer(self._beside.read(found, place.at("uri")), np.uint8)
 
-def embedded(place: JsonView) -> Bytes:
-    """The bytes of a `data:` URI."""
-    uri = place.text("uri")
-    if not uri:
-        extensions = place.object("extensions")
-        names = sorted(extensions.value) if extensions else []
-        which = f": its data are there in compressed form only ({names[0][:60]})" if names else ""
-        raise place.error("uri", f"is missing{which}")
-    head, comma, body = uri.partition(",")
-    if not head.startswith("data:") or not comma or not head.endswith(";base64"):
-        raise place.error(
-            "uri", f"refers to another file, {shown(uri)}, which is not part of this one; save the model as a GLB"
-        )
+
+def external(data: bytes) -> list[tuple[str, str]]:
+    """The URIs of a file that lead to others, with their places; [] for one that is broken."""
+    try:
+        root = GltfDocument(data, AssetLimits()).root
+        items = [item for kind in ("buffers", "images") for item in root.objects(kind)]
+        named = [(item.at("uri"), item.text("uri", "")) for item in items]
+    except ParseError:
+        return []  # the importer says where
+    return [(pointer, uri) for pointer, uri in named if uri and not DATA.match(uri)]
+
+
+def _embedded(text: str, place: JsonView) -> Bytes:
+    """The bytes of a `data:` URI, from what follows its scheme."""
+    head, comma, body = text.partition(",")
+    if not comma:
+        raise place.error("uri", "is a `data:` URI without a comma, which stands before the data")
+    encoded = unquote_to_bytes(body)
+    if not head.lower().endswith(";base64"):
+        return np.frombuffer(encoded, np.uint8)
     try:
         # The check is strict: else characters outside base64 would be skipped and the bytes behind them shifted.
         # Blanks are harmless.
-        encoded = b"".join(unquote_to_bytes(body).split())
-        return np.frombuffer(base64.b64decode(encoded, validate=True), np.uint8)
+        return np.frombuffer(base64.b64decode(b"".join(encoded.split()), validate=True), np.uint8)
     except (ValueError, binascii.Error) as error:
         raise place.error("uri", f"is not valid base64: {str(error).lower()}") from None
 

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from service.formats.errors import ParseError
+from service.formats.read.archive import Archive
 from service.formats.read.gltf import animations, lights_and_camera, variants
 from service.formats.read.gltf.bad_rows import usable
+from service.formats.read.gltf.beside import Beside
 from service.formats.read.gltf.deform import Skin, morphed, weights
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.extensions import note_unsupported
@@ -31,12 +33,19 @@ from service.formats.types import AssetLimits, Pose, SceneFile
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits, pose: Pose | None = None) -> SceneFile:
     """The scene of a glTF file, as it was saved or in a pose. Raises ParseError."""
-    return _Importer(GltfDocument(data, limits), pose or Pose()).run()
+    return _Importer(GltfDocument(data, limits), pose or Pose(), Warnings()).run()
+
+
+def read_zipped_scene(archive: Archive, path: str, limits: AssetLimits, pose: Pose | None = None) -> SceneFile:
+    """The scene of the glTF file at this path of a zip, likewise. Raises ParseError."""
+    notes = Warnings()
+    file = GltfDocument(archive.read(path), limits, Beside(archive, path, notes))
+    return _Importer(file, pose or Pose(), notes).run()
 
 
 class _Importer:
-    def __init__(self, file: GltfDocument, pose: Pose) -> None:
-        self.file, self.notes, self.files = file, Warnings(), PartFiles()
+    def __init__(self, file: GltfDocument, pose: Pose, notes: Warnings) -> None:
+        self.file, self.notes, self.files = file, notes, PartFiles()
         self.animations, self.variants = animations.listed(file, self.notes), variants.listed(file)
         if pose.variant is not None:
             variants.choose(file, pose.variant)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from service.formats.errors import ParseError
+from service.formats.read.archive import Archive
 from service.formats.read.gltf.bad_rows import usable
+from service.formats.read.gltf.beside import Beside
 from service.formats.read.gltf.deform import Skin, morphed, weights
 from service.formats.read.gltf.document import Array, GltfDocument
 from service.formats.read.gltf.nodes import Nodes, instances
@@ -17,7 +19,16 @@ from service.formats.types import AssetLimits, Indices
 
 def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
     """The merged mesh of a glTF file. Raises ParseError."""
-    file, notes = GltfDocument(data, limits), Warnings()
+    return _merged(GltfDocument(data, limits), Warnings(), limits)
+
+
+def read_zipped_merged(archive: Archive, path: str, limits: AssetLimits) -> RawMesh:
+    """The merged mesh of the glTF file at this path of a zip. Raises ParseError."""
+    notes = Warnings()
+    return _merged(GltfDocument(archive.read(path), limits, Beside(archive, path, notes)), notes, limits)
+
+
+def _merged(file: GltfDocument, notes: Warnings, limits: AssetLimits) -> RawMesh:
     nodes, read, parts, triangles = Nodes(file, notes), dict[str, Primitive | None](), list[Primitive](), 0
     for node in nodes.shown:
         if "mesh" not in node.place:

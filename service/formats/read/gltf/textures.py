@@ -70,10 +70,18 @@ class Textures:
         return self._names[key]
 
     def source(self, texture: JsonView) -> JsonView | None:
-        """The texture's image; None, with a warning, where its format is not read."""
+        """The texture's image; None, with a warning, where its format is not read or its file is not there."""
+        is_lost = False
         for owner in (*map(texture.extension, ("EXT_texture_webp", ktx2_images.NAME)), texture):
             if owner is not None and "source" in owner:
-                return self.file.follow(owner, "source", "images")
+                image = self.file.follow(owner, "source", "images")
+                lost = self.file.lacks(image)
+                if not lost:
+                    return image
+                self.notes.add(image.at("uri"), f"the image {lost[:100]!r} is not there; it is left out")
+                is_lost = True
+        if is_lost:
+            return None
         other = texture.object("extensions")
         names = sorted(other.value) if other else []
         which = f" ({', '.join(names)[:80]})" if names else ""

@@ -238,11 +238,13 @@ class Graphs:
         size, place = SIZES[type], self.place(node.getNamePath())
         name, space = self._text(node, definition, "file" if by is None else by[0], scope)
         try:
-            file = self.images.located(name, self.file)
+            found = self.images.located(name, self.file)
         except Unsupported as problem:
             self.notes.add(place, f"{problem}; the node's default is used")
             return self._input(node, definition, "default", scope)
-        texts = {"file": file, "space": "linear", "place": place}
+        if found.remark:
+            self.notes.add(place, f"the image {found.remark}")
+        texts = {"file": found.path, "space": "linear", "place": place}
         for text, attribute in (("wrap_u", "uaddressmode"), ("wrap_v", "vaddressmode"), ("filter", "filtertype")):
             texts[text] = self._text(node, definition, attribute, scope)[0]
         if texts["filter"] == "closest":

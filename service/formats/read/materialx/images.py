@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import posixpath
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 
 from service.formats.formats import KINDS, sniff
 from service.formats.read.image import parse_image
-from service.formats.read.obj.paths import is_absolute
+from service.formats.read.references import Finder, Found, is_absolute
 from service.formats.surface.trees import Unsupported
 from service.formats.types import AssetLimits, Floats, ImageData
 
@@ -21,33 +20,29 @@ MOST_BYTES = 1 << 30  # of the decoded images of one upload
 
 @dataclass
 class Images:
-    """The images of an upload. `names` are its files; `read` returns the bytes of one."""
+    """The images of an upload. `finder` knows its files; `read` returns the bytes of one."""
 
-    names: Iterable[str]
+    finder: Finder
     read: Callable[[str], bytes]
     limits: AssetLimits
     _decoded: dict[str, ImageData] = field(default_factory=dict)
     _bytes: int = 0
 
-    def located(self, reference: str, source: str) -> str:
-        """The path of the image that `source`, a `.mtlx` file, names. Raises Unsupported."""
+    def located(self, reference: str, source: str) -> Found:
+        """The image that `source`, a `.mtlx` file, names. Raises Unsupported."""
         shown = repr(reference[:100])
         if "<" in reference:
             raise Unsupported(f"the image {shown} has a token in its name, such as <UDIM>, which is not supported")
-        given = reference.replace("\\", "/")
-        if not given or is_absolute(given) or "://" in given:
+        found = self.finder.find(source, reference)
+        if found is None and (not reference or is_absolute(reference) or "://" in reference):
             raise Unsupported(f"the image {shown} is not a path inside the upload")
-        path = posixpath.normpath(posixpath.join(posixpath.dirname(source), given))
-        known = set(self.names)
-        beside = posixpath.join(posixpath.dirname(source), posixpath.basename(path))
-        if path not in known and beside in known and ".." not in path.split("/"):
-            path = beside  # files that were dropped together have lost their folders
-        if path not in known:
+        if found is None:
             raise Unsupported(f"the image {shown} is not in the upload; a zip has a .mtlx file and its images")
+        path = found.path
         format = sniff(self.read(path), filename=path)
         if format is None or KINDS[format] != "image":
             raise Unsupported(f"the image {shown} is not in a supported format ({FORMATS})")
-        return path
+        return found
 
     def decoded(self, path: str) -> ImageData:
         """Raises ParseError where the image is broken or too large."""

@@ -12,6 +12,7 @@ from service.formats.read.materialx.graph import Graphs
 from service.formats.read.materialx.images import Images
 from service.formats.read.materialx.surface import Surface
 from service.formats.read.materialx.values import Values
+from service.formats.read.references import Finder
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
@@ -19,21 +20,22 @@ from service.formats.surface import MODELS
 from service.formats.surface.trees import Unsupported, times
 from service.formats.types import AssetLimits, SceneFile
 
-SUFFIX = ".mtlx"
 ALONE = "material.mtlx"  # the name of a file that came without a zip
 MOST_FILES, MOST_MATERIALS = 100, 1_000
 # What a document needs beside materials; nobody sees it.
 CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
 
-def read_materialx(names: Iterable[str], read: Callable[[str], bytes], limits: AssetLimits) -> SceneFile:
-    """The materials of the `.mtlx` files among `names`, each a `principled` or an `openpbr`. Raises ParseError."""
+def read_materialx(
+    sources: Iterable[str], finder: Finder, read: Callable[[str], bytes], limits: AssetLimits
+) -> SceneFile:
+    """The materials of these `.mtlx` files, each a `principled` or an `openpbr`. `finder` knows the images beside
+    them. Raises ParseError."""
     check_library()
-    names = list(names)
-    sources = sorted(name for name in names if name.lower().endswith(SUFFIX))
+    sources = sorted(sources)
     if len(sources) > MOST_FILES:
         raise ParseError(f"it has {len(sources)} MaterialX files; {MOST_FILES} are allowed")
-    reading = _Reading(names, read, limits, several=len(sources) > 1)
+    reading = _Reading(finder, read, limits, several=len(sources) > 1)
     for source in sources:
         reading.file(source)
     if not reading.materials:
@@ -46,7 +48,7 @@ def read_materialx(names: Iterable[str], read: Callable[[str], bytes], limits: A
 
 @dataclass
 class _Reading:
-    names: list[str]
+    finder: Finder
     read: Callable[[str], bytes]
     limits: AssetLimits
     several: bool  # files, so that places must name theirs
@@ -56,7 +58,7 @@ class _Reading:
     values: Values = field(init=False)
 
     def __post_init__(self) -> None:
-        self.values = Values(Images(self.names, self.read, self.limits), self.files, self.notes)
+        self.values = Values(Images(self.finder, self.read, self.limits), self.files, self.notes)
 
     @property
     def textures(self) -> dict[str, dict[str, Any]]:

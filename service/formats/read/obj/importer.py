@@ -1,5 +1,4 @@
-"""A zip with an OBJ file, its material libraries and textures, or with a PLY file and its textures, as a document
-whose meshes and images are parts.
+"""An OBJ or a PLY file in a zip, its material libraries and textures as a document with meshes and images as parts.
 
 Each material's triangles become a mesh of their own. Coordinates stay as they are, and nothing else is merged or
 reordered.
@@ -7,24 +6,22 @@ reordered.
 
 from __future__ import annotations
 
-import io
-import zipfile
-from collections.abc import Mapping
+import posixpath
 from typing import Any
 
 import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.formats import text
+from service.formats.read.archive import Archive
 from service.formats.read.bad_elements import mend
-from service.formats.read.obj.archive import Archive
+from service.formats.read.obj.libraries import named_libraries
 from service.formats.read.obj.materials import Materials
 from service.formats.read.obj.mtl import Map, MtlMaterial, read_mtl
-from service.formats.read.obj.paths import library_names, located
 from service.formats.read.obj.textures import Textures
 from service.formats.read.obj_lines import Named
-from service.formats.read.obj_mesh import MaterialMesh, read_obj, read_obj_with_materials
-from service.formats.read.ply import read_ply, read_textured_ply
+from service.formats.read.obj_mesh import MaterialMesh, read_obj_with_materials
+from service.formats.read.ply import read_textured_ply
 from service.formats.read.polygons import Longs
 from service.formats.read.raw_mesh import RawMesh
 from service.formats.read.scenes.framing import framed
@@ -40,18 +37,16 @@ MOST_MATERIALS = 10_000  # materials that faces use
 MOST_LIBRARIES = 1_000
 
 
-def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
-    """The scene of a zipped OBJ file. Raises ParseError."""
-    archive, notes = Archive(data, limits.max_file), Warnings()
-    path = _model(archive)
+def read_obj_scene(archive: Archive, path: str, limits: AssetLimits) -> SceneFile:
+    """The scene of the OBJ file at this path of a zip. Raises ParseError."""
+    notes = Warnings()
     read = read_obj_with_materials(text(archive.read(path)))
     library = _library(path, read.libraries, archive, notes)
     return _scene(path, read, library, archive, notes, limits)
 
 
-def read_ply_scene(archive: Archive, limits: AssetLimits) -> SceneFile:
-    """The scene of a zipped PLY file, whose comments name its textures. Raises ParseError."""
-    path = _model(archive, PLY)
+def read_ply_scene(archive: Archive, path: str, limits: AssetLimits) -> SceneFile:
+    """The scene of the PLY file at this path of a zip, whose comments name its textures. Raises ParseError."""
     found = read_textured_ply(memoryview(archive.read(path)))
     place = path.rpartition("/")[2]
     numbers: dict[str, int] = {"": 0}  # of the materials: one for each texture, called by its name
@@ -86,7 +81,7 @@ def _scene(
         _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
         for worn, which in _by_material(read)
     ]
-    group = name[: -len(OBJ)]  # or of PLY, which is as long
+    group = posixpath.splitext(name)[0]
     shapes = [{"name": f"{group}/{shape['material']}" if len(shapes) > 1 else group} | shape for shape in shapes]
     document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
     if textures.documents:
@@ -102,38 +97,6 @@ def _scene(
     return SceneFile(document, files.parts, notes.document(), len(mesh.faces), False, bounds=corners)
 
 
-def read_zipped_mesh(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
-    """The triangles of the OBJ or PLY file in a zip as one mesh, without its materials. Raises ParseError."""
-    archive = Archive(data, limits.max_file)
-    if not any(name.lower().endswith(OBJ) for name in archive.names) and holds_ply(archive):
-        return read_ply(memoryview(archive.read(_model(archive, PLY))))
-    return read_obj(text(archive.read(_model(archive))))
-
-
-def holds_ply(archive: Archive) -> bool:
-    return any(name.lower().endswith(PLY) for name in archive.names)
-
-
-def zipped(files: Mapping[str, bytes]) -> bytes:
-    """Files by path as a zip that `read_obj_scene` takes; the same files always give the same bytes."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        for path in sorted(files):
-            archive.writestr(zipfile.ZipInfo(path), files[path])
-    return out.getvalue()
-
-
-def _model(archive: Archive, ending: str = OBJ) -> str:
-    """The path of the only file with this ending."""
-    found = [name for name in archive.names if name.lower().endswith(ending)]
-    if len(found) != 1:
-        kind = ending[1:].upper()
-        named = ", ".join(repr(name[:60]) for name in found[:3])
-        what = f"holds {len(found)} {kind} files, {named}" if found else f"holds no {kind} file"
-        raise ParseError(f"the zip {what}; one is needed, with its materials and textures")
-    return found[0]
-
-
 def _library(model: str, statements: list[Named], archive: Archive, notes: Warnings) -> dict[str, MtlMaterial]:
     """The materials of all libraries that the zip contains; the first of several with the same name."""
     if len(statements) > MOST_LIBRARIES:
@@ -142,16 +105,21 @@ def _library(model: str, statements: list[Named], archive: Archive, notes: Warni
     read: set[str] = set()
     for statement in statements:
         place = f"{model.rpartition('/')[2]}:{statement.line}"
-        names = library_names(statement.name, lambda name: located(model, name) in archive)
-        paths = [located(model, name) for name in names]
-        for name, path in zip(names, paths, strict=True):
+        for name, file in named_libraries(model, statement.name, archive.finder):
+            path = name if file is None else file.path
             if path in read:
                 continue
             read.add(path)
-            if path not in archive or path == model:
+            if file is None or path == model:
                 notes.add(place, f"the material library {name[:100]!r} is not there; its materials are shown grey")
                 continue
+            if file.remark:
+                notes.add(place, f"the material library {file.remark}")
             found = read_mtl(path, archive.read(path), notes) | found
+    maps = (each for material in found.values() for each in material.maps.values())
+    readings = (one for each in maps for one in (each, *each.others) if one.reference)
+    images = (archive.finder.find(one.source, one.reference) for one in readings)
+    archive.used |= {image.path for image in images if image is not None}  # shown or not, they belong to the model
     return found
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from service.formats.read.obj.libraries import without_comment
 from service.formats.read.obj.mtl import Map, MtlMaterial
-from service.formats.read.obj.paths import without_comment
 from service.formats.read.obj.textures import Textures
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.plain_mesh import GREY, NAME

@@ -11,7 +11,8 @@ import re
 from dataclasses import dataclass, field, replace
 
 from service.formats.errors import ParseError
-from service.formats.read.obj.paths import without_comment
+from service.formats.formats import decoded, text
+from service.formats.read.obj.libraries import without_comment
 from service.formats.read.scenes.warnings import Warnings
 
 MAX_BYTES = 16 << 20  # bytes of a library; a thousand materials take 0.3 MiB
@@ -83,8 +84,8 @@ def read_mtl(path: str, data: bytes, notes: Warnings) -> dict[str, MtlMaterial]:
         raise ParseError(f"it has {len(data)} bytes; {MAX_BYTES} are allowed of a material library", file)
     found: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
-    text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    for number, line in enumerate(text.split("\n"), 1):
+    lines = text(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    for number, line in enumerate(map(decoded, lines), 1):
         keyword, rest = _statement(line)
         place = f"{file}:{number}"
         if not keyword:
@@ -116,6 +117,8 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
     if keyword in AMBIENT:
         if keyword == "ka" and not any(_numbers(keyword, rest) or ()):
             return
+        if keyword == "map_ka":
+            material.maps[keyword] = _map(rest, place, path)
     elif keyword in COLORS or keyword in SCALARS:
         values = _numbers(keyword, rest)
         if values is None:
@@ -129,6 +132,8 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
             return
         material.maps[keyword] = found
     else:
+        if "map" in keyword or keyword in ("refl", "decal"):
+            material.maps[keyword] = _map(rest, place, path)  # it is not shown, but belongs to the model
         notes.add(place, IGNORED.get(keyword, f"the statement {keyword[:40]!r} is not supported and is ignored"))
         return
     material.places[keyword] = place

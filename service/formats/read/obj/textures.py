@@ -10,10 +10,9 @@ import numpy as np
 
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
+from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
-from service.formats.read.obj.archive import Archive
 from service.formats.read.obj.mtl import Map
-from service.formats.read.obj.paths import is_absolute, located
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -42,7 +41,7 @@ class Textures:
     def chosen(self, found: Map) -> Map:
         """The map, read so that there is a file of its name; as the format says where there is none."""
         readings = (found, *found.others)
-        return next((one for one in readings if located(one.source, one.reference) in self.archive), found)
+        return next((one for one in readings if self.archive.finder.find(one.source, one.reference)), found)
 
     def use(self, found: Map, is_color: bool = False) -> str | None:
         """The name of the texture; None, with a warning, where its image is missing or in an unsupported format.
@@ -108,20 +107,20 @@ class Textures:
 
     def _image(self, found: Map) -> tuple[str, bytes | None]:
         """The path of a map's image, and the image."""
-        path = located(found.source, found.reference)
+        path = self.archive.finder.located(found.source, found.reference, place=found.place, notes=self.notes)
+        if path is None:
+            shown = repr(found.reference[:100])
+            self.notes.add(found.place, f"the texture {shown} is not there; the material is shown without it")
+            return "", None
         if path not in self._found:
             self._found[path] = self._read(path, found)
         return path, self._found[path]
 
     def _read(self, path: str, found: Map) -> bytes | None:
-        shown = repr(found.reference[:100])
-        if path not in self.archive:
-            where = " beside the library" if is_absolute(found.reference) else ""
-            self.notes.add(found.place, f"the texture {shown} is not there{where}; the material is shown without it")
-            return None
         data = self.archive.read(path)
         format = sniff(data, filename=path) if data else None
         if format is None or KINDS[format] != "image":
+            shown = repr(found.reference[:100])
             self.notes.add(found.place, f"the texture {shown} is not in a supported format ({FORMATS}); left out")
             return None
         return data

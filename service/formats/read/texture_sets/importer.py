@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, sniff
-from service.formats.read.obj.archive import Archive
+from service.formats.formats import KINDS, OTHER_MODELS, UNREAD, sniff
+from service.formats.read.archive import Archive
 from service.formats.read.obj.textures import FORMATS
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -32,8 +32,8 @@ RELIEF = 0.02  # metres from black to white, as of bricks or bark: images do not
 CAMERA = {"position": [0, 0, 4], "target": [0, 0, 0]}
 
 
-def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
-    """The materials of a zip, each a `principled`. Raises ParseError."""
+def read_texture_sets(archive: Archive, limits: AssetLimits, nothing: str) -> SceneFile:
+    """The materials of a zip, each a `principled`. Raises ParseError, which says `nothing` where there is none."""
     notes, files = Warnings(names_files=True), PartFiles()
     note = by_note(archive)
     others = [path for path in archive.names if note is None or path != note[0]]
@@ -41,10 +41,7 @@ def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
     sets = texture_sets(images, notes)
     if not sets:
         tiles = f". {UDIM}, and it has none that is tile {FIRST_TILE}" if notes.has(UDIM) else ""
-        raise ParseError(
-            "the zip holds no OBJ file, and no images whose names say what they are, such as wood_color.png and "
-            f"wood_normal.png{tiles}"
-        )
+        raise ParseError(f"{nothing}{tiles}")
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
     textures = _Textures(images, files, limits)
@@ -64,6 +61,9 @@ def read_texture_sets(archive: Archive, limits: AssetLimits) -> SceneFile:
 
 
 def _image(archive: Archive, path: str, notes: Warnings) -> bytes | None:
+    if path.lower().endswith(OTHER_MODELS):
+        notes.add(path, f"{UNREAD}; left out")
+        return None
     data = archive.read(path)
     format = sniff(data, filename=path) if data else None
     if format is None or KINDS[format] != "image":

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from service.formats.read.obj.archive import Archive
+from service.formats.read.archive import Archive
 
 Size = tuple[float, float]  # width and height in metres
 NUMBER = r"(\d{1,4}(?:\.\d{1,4})?)"

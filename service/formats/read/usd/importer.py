@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, Work
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
 from service.formats.errors import ParseError
+from service.formats.read.archive import Archive
 from service.formats.read.raw_mesh import MAX_COORDINATE, RawMesh
 from service.formats.read.scenes import metering
 from service.formats.read.scenes.framing import framed
@@ -21,7 +22,7 @@ from service.formats.read.usd import cameras
 from service.formats.read.usd.lights import Lamp, Lights
 from service.formats.read.usd.materials import Bound, Materials
 from service.formats.read.usd.meshes import Mesh, Piece
-from service.formats.read.usd.package import Package
+from service.formats.read.usd.package import Package, opened
 from service.formats.read.usd.solids import Solid, is_solid, solid
 from service.formats.read.usd.textures import Textures
 from service.formats.read.usd.walk import Item, Walk
@@ -32,19 +33,31 @@ UNSEEN = (UsdGeom.Curves, UsdGeom.Points, UsdGeom.NurbsPatch, UsdGeom.TetMesh)
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     """The scene of a USD file. Raises ParseError."""
-    return _Importer(data, limits).run()
+    notes = Warnings()
+    return _Importer(opened(data, limits, notes), limits, notes).run()
+
+
+def read_zipped_scene(archive: Archive, path: str, limits: AssetLimits) -> SceneFile:
+    """The scene of the layer at this path of a zip. Raises ParseError."""
+    notes = Warnings()
+    return _Importer(Package(b"", notes, archive, path), limits, notes).run()
 
 
 def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
     """All triangles of a USD file where they stand, as one mesh. Raises ParseError."""
-    return _Importer(data, limits).merged()
+    notes = Warnings()
+    return _Importer(opened(data, limits, notes), limits, notes).merged()
+
+
+def read_zipped_merged(archive: Archive, path: str, limits: AssetLimits) -> RawMesh:
+    """The triangles of the layer at this path of a zip, likewise. Raises ParseError."""
+    notes = Warnings()
+    return _Importer(Package(b"", notes, archive, path), limits, notes).merged()
 
 
 class _Importer:
-    def __init__(self, data: bytes | memoryview, limits: AssetLimits) -> None:
-        Work.SetConcurrencyLimit(1)  # the child has one core's worth of time, and its threads would want memory each
-        self.limits, self.notes, self.files = limits, Warnings(), PartFiles()
-        package = Package(data, limits, self.notes)
+    def __init__(self, package: Package, limits: AssetLimits, notes: Warnings) -> None:
+        self.limits, self.notes, self.files = limits, notes, PartFiles()
         self.stage = package.stage()
         self.unit = UsdGeom.GetStageMetersPerUnit(self.stage)
         if not 1e-9 <= self.unit <= 1e9:

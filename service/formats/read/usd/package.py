@@ -1,8 +1,9 @@
 """A USD file as layers in memory, whose references lead nowhere but into the upload.
 
 Each layer is anonymous: it has no place on the disk from which a path could start. What a layer refers to is looked
-up in the package (a .usdz), and every path to a layer there is replaced by that layer's own identifier before
-anything is composed; a path that leads elsewhere is removed. So USD never resolves a path that a stranger wrote.
+up in the package (a .usdz, or any zip), and every path to a layer there is replaced by that layer's own identifier
+before anything is composed; a path that leads elsewhere is removed. So USD never resolves a path that a stranger
+wrote.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ import re
 from dataclasses import dataclass, field
 from functools import partial
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdUtils, Work
 
 from service.formats.errors import ParseError
 from service.formats.formats import CRATE, USD_LAYERS, USD_TEXT, text
-from service.formats.read.obj.archive import Archive
+from service.formats.read.archive import Archive
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.types import AssetLimits
 
@@ -32,28 +33,25 @@ BRACES = re.compile(
     """,
     re.DOTALL | re.VERBOSE,
 )
-ALONE = "which is not part of this one; save the scene as a .usdz"
+ALONE = "which is not part of this one; save the scene as a .usdz, or upload a zip of its folder"
 
 
 @dataclass
 class Package:
-    """The layers of a file, and the images beside them. Raises ParseError where a layer cannot be read."""
+    """The layers of a file, and the images beside them. Raises ParseError where a layer cannot be read.
+
+    `files` is the zip that holds its layers, and `path` that of its root there; a layer that came alone has neither.
+    """
 
     data: bytes | memoryview
-    limits: AssetLimits
     notes: Warnings
+    files: Archive | None = None
+    path: str = ""
     _layers: dict[str, Sdf.Layer] = field(default_factory=dict)
     _unread: list[str] = field(default_factory=list)  # names of layers whose paths are still those of the file
 
     def __post_init__(self) -> None:
-        self._files: Archive | None = None
-        root = ""
-        if bytes(self.data[:4]) == b"PK\x03\x04":
-            self._files = Archive(self.data, self.limits.max_file)
-            root = next((name for name in self._files.names if name.lower().endswith(USD_LAYERS)), "")
-            if not root:
-                raise ParseError("the package holds no layer, a .usd, .usda or .usdc file")
-        self.root = self._layer(root)
+        self.root = self._layer(self.path)
         while self._unread:
             name = self._unread.pop()
             layer = self._layers[name]
@@ -69,13 +67,13 @@ class Package:
 
     def file(self, path: str) -> bytes | None:
         """The bytes of a file that a layer names, by the path that its attribute has now; None for one outside."""
-        if self._files is None or not path.startswith(INSIDE):
+        if self.files is None or not path.startswith(INSIDE):
             return None
-        return self._files.read(path.removeprefix(INSIDE))
+        return self.files.read(path.removeprefix(INSIDE))
 
     def _layer(self, name: str) -> Sdf.Layer:
         if name not in self._layers:
-            data = self.data if self._files is None else self._files.read(name)
+            data = self.data if self.files is None else self.files.read(name)
             self._layers[name] = _read(data, name)
             self._unread.append(name)
         return self._layers[name]
@@ -103,19 +101,51 @@ class Package:
         return OUTSIDE + path[:200]
 
     def _is_layer(self, name: str) -> bool:
-        assert self._files is not None
-        return self._files.read(name).startswith((USD_TEXT, CRATE))
+        assert self.files is not None
+        return self.files.read(name).startswith((USD_TEXT, CRATE))
 
     def _located(self, layer: str, path: str) -> str | None:
-        """The name of a file of the package: relative to the layer, else to the package's root."""
-        if self._files is None or "\0" in path or path.startswith("/"):
+        """The name of a file of the package: relative to the layer, else to the package's root, else by its last
+        part."""
+        if self.files is None or not path or "\0" in path:
             return None
-        near = posixpath.normpath(posixpath.join(posixpath.dirname(layer), path))
-        return next((name for name in (near, posixpath.normpath(path)) if name in self._files), None)
+        finder = self.files.finder
+        found = finder.find(layer, path)
+        if found is not None and found.remark and (there := finder.path(posixpath.normpath(path))) is not None:
+            return there
+        if found is not None and found.remark:
+            self.notes.add(layer or path, found.remark)
+        return None if found is None else found.path
+
+
+def root_layers(archive: Archive, names: list[str]) -> list[str]:
+    """Those of the layers of a zip to which no other one refers; the first where all do. Raises ParseError."""
+    if len(names) == 1 or (names and names[0] == archive.names[0] and archive.is_package):
+        return names[:1]
+    referred: set[str] = set()
+    for name in names:
+        layer = _read(archive.head(name, archive.size(name)), name)
+        for path in layer.GetCompositionAssetDependencies():
+            found = archive.finder.find(name, path)
+            if found is not None and found.path != name:
+                referred.add(found.path)
+    return [name for name in names if name not in referred] or names[:1]
+
+
+def opened(data: bytes | memoryview, limits: AssetLimits, notes: Warnings) -> Package:
+    """A layer that came alone, or a package, whose first file is its root. Raises ParseError."""
+    if bytes(data[:4]) != b"PK\x03\x04":
+        return Package(data, notes)
+    files = Archive(data, limits.max_file)
+    root = next((name for name in files.names if name.lower().endswith(USD_LAYERS)), "")
+    if not root:
+        raise ParseError("the package holds no layer, a .usd, .usda or .usdc file")
+    return Package(b"", notes, files, root)
 
 
 def _read(data: bytes | memoryview, name: str) -> Sdf.Layer:
     """A layer without a place, from its bytes. The tag of an anonymous layer says its format, no more."""
+    Work.SetConcurrencyLimit(1)  # the child has one core's worth of time, and its threads would want memory each
     binary = bytes(data[: len(CRATE)]) == CRATE
     layer = Sdf.Layer.CreateAnonymous(".usdc" if binary else ".usda")
     try:

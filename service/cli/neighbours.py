@@ -1,0 +1,147 @@
+"""A model on disk and the files that it names, as one zip: what the importers read, by the rule by which they find
+files in it."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service.cli import BadInput
+from service.formats.errors import ParseError
+from service.formats.formats import MODELS, decoded, text
+from service.formats.read.references import URL, Finder, base_name, is_absolute, located
+from service.problems import AssetError
+
+if TYPE_CHECKING:
+    from service.server.assets import FileAssets
+
+MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]*)")
+ENDINGS = {"obj": (".obj",), "mtlx": (".mtlx",), "gltf": (".gltf",), "glb": (".glb",), "ply": (".ply",)}
+ENDINGS |= {format: (f".{format}",) for format in MODELS}
+
+
+def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes | None:
+    """A zip of the model and those of its files that exist; None where it names none. Raises BadInput for a file that
+    may not be read."""
+    from service.formats.read.archive import zipped
+
+    beside = _Neighbours(files)
+    found = _PARTS[format](data, beside)
+    if found is None:
+        return None
+    entries = {name: files.read(name) for name in found}
+    # A path may lead out of the folder where --asset-root allows that: in the zip the model lies as deep.
+    deep = max((name.split("/").count("..") for name in entries), default=0)
+    folder = "/".join(["model"] * deep)
+    member = path.name if path.suffix.lower() in ENDINGS[format] else f"{path.name}{ENDINGS[format][0]}"
+    named = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in entries.items()}
+    return zipped(named | {posixpath.join(folder, member.replace("\\", "_")): data})
+
+
+class _Neighbours:
+    """The files in the model's folder, and in other folders that were allowed."""
+
+    def __init__(self, files: FileAssets) -> None:
+        self.files = files
+
+    def find(self, source: str, *spellings: str, place: str) -> str | None:
+        """The path of the file that the file at `source` calls by one of these names. Both are relative to the
+        model's folder. Raises BadInput."""
+        for reference in spellings:
+            if not URL.match(reference) and not is_absolute(reference):
+                path = located(source, reference)
+                if self._holds(path, place):
+                    return path
+        for reference in spellings:
+            beside = posixpath.join(posixpath.dirname(source), base_name(reference))
+            if base_name(reference) and not URL.match(reference) and self._holds(beside, place):
+                return beside
+        found = self._finder.find(source, *spellings)
+        return None if found is None else found.path
+
+    def _holds(self, path: str, place: str) -> bool:
+        try:
+            return bool(path) and path != "." and self.files.holds(path)
+        except AssetError as error:
+            raise BadInput(f"{place}: {error.detail}") from None
+
+    @cached_property
+    def _finder(self) -> Finder:
+        return Finder(self.files.listed())
+
+
+def _of_obj(data: bytes, beside: _Neighbours) -> list[str]:
+    """Material libraries and the images that they name."""
+    from service.formats.read.obj.libraries import without_comment
+    from service.formats.read.obj.mtl import read_mtl
+    from service.formats.read.scenes.warnings import Warnings
+
+    libraries: dict[str, None] = {}
+    for statement in dict.fromkeys(MTLLIB.findall(text(data))):
+        named = decoded(statement).strip()
+        plain = without_comment(named)
+        wholes = (beside.find("", name, place="mtllib") for name in dict.fromkeys((named, plain)) if name)
+        whole = next((each for each in wholes if each), None)
+        names = [whole] if whole else [beside.find("", name, place="mtllib") for name in plain.split()]
+        libraries |= {name: None for name in names if name is not None and not name.lower().endswith(".obj")}
+    found = dict(libraries)
+    for library in libraries:
+        try:
+            materials = read_mtl(library, beside.files.read(library), Warnings())  # the importer reports its oddities
+        except ParseError:
+            continue  # and its mistakes
+        maps = [each for material in materials.values() for each in material.maps.values()]
+        for each in (reading for found_map in maps for reading in (found_map, *found_map.others)):
+            image = beside.find(library, each.reference, place=each.place) if each.reference else None
+            found |= {image: None} if image is not None else {}
+    return list(found)
+
+
+def _of_gltf(data: bytes, beside: _Neighbours) -> list[str] | None:
+    """Buffers, which must be there, and images."""
+    from service.formats.read.gltf.beside import spellings
+    from service.formats.read.gltf.document import external
+
+    named = external(data)
+    found = []
+    for pointer, uri in named:
+        path = beside.find("", *spellings(uri), place=pointer)
+        if path is None and pointer.startswith("/buffers"):
+            where = "lies elsewhere; only files beside the model are read" if URL.match(uri) else "is not there"
+            raise BadInput(f"{pointer}: {uri[:100]!r} {where}")
+        if path is not None:
+            found.append(path)
+    return found if named else None
+
+
+def _of_mtlx(data: bytes, beside: _Neighbours) -> list[str]:
+    from service.formats.read.materialx.document import file_names
+
+    names = file_names(data)
+    return [path for name in names if (path := beside.find("", name, place="the MaterialX file")) is not None]
+
+
+def _of_ply(data: bytes, beside: _Neighbours) -> list[str] | None:
+    from service.formats.read.ply_header import read_header
+
+    try:
+        names = read_header(memoryview(data)).textures
+    except ParseError:
+        return None  # the importer reports the mistake
+    return [path for name in names if (path := beside.find("", name, place="TextureFile")) is not None] or None
+
+
+def _of_library(data: bytes, beside: _Neighbours) -> list[str] | None:
+    """The images whose names stand in the file, which a library alone can read."""
+    images = tuple(f".{suffix}" for suffix in IMAGES)
+    known = data.lower()
+    names = [name for name in beside.files.listed() if name.lower().endswith(images)]
+    return [name for name in names if base_name(name).lower().encode() in known] or None
+
+
+IMAGES = ("png", "jpg", "jpeg", "webp", "tga", "bmp", "tif", "tiff")
+_PARTS = {"obj": _of_obj, "gltf": _of_gltf, "glb": _of_gltf, "mtlx": _of_mtlx, "ply": _of_ply}
+_PARTS |= dict.fromkeys(MODELS, _of_library)
