@@ -34,3 +34,6 @@ def test_a_zip_becomes_a_scene_with_its_materials(editor: Editor) -> None:
     editor.drop("#stage", {"nothing.zip": zipped({"readme.txt": "hello"})})
     editor.wait("the refusal", lambda: "nothing.zip could not be used" in editor.text("#messages"))
     assert not editor.differs(shown, 8), "without a model it changes nothing"
+
+    editor.drop("#stage", {"two.zip": zipped({"a.obj": TWO, "b.obj": TWO})})
+    editor.wait("the names", lambda: "the zip holds 2 models, a.obj and b.obj" in editor.text("#messages"))

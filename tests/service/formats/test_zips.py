@@ -146,6 +146,20 @@ def test_layers_to_which_no_other_refers_are_models(store: AssetStore) -> None:
     assert one.id == "sha256:" + hashlib.sha256(usda()).hexdigest()
 
 
+@pytest.mark.usd
+def test_the_first_layer_of_a_package_is_its_root(store: AssetStore) -> None:
+    """As the format of packages demands: files stored as they are, each at a multiple of 64 bytes."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as package:
+        for name in ("a.usda", "b.usda"):
+            entry = zipfile.ZipInfo(name)
+            space = -(made.tell() + 30 + len(name) + 4) % 64
+            entry.extra = b"\x86\x19" + space.to_bytes(2, "little") + bytes(space)
+            package.writestr(entry, usda())
+    info = store.add(made.getvalue())
+    assert info.kind == "scene" and any("b.usda" in detail for detail in told(info))
+
+
 def test_an_animation_and_a_variant_of_a_zipped_gltf_are_posed(server: Server) -> None:
     """The same as of the file alone."""
     file = Gltf()
