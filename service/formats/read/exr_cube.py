@@ -12,7 +12,7 @@ from service.formats.types import AssetLimits, Floats
 
 FORMAT = "CubeFace Environment"  # OpenImageIO's `textureformat` of such a file
 TOLD = "its six faces of a cube are shown as a latitude-longitude image"
-SMALL = 1024  # texels a side: each texel of a smaller cube's image is a mean of four, as suns may be one texel wide
+SMALL = 512  # texels a side: each texel of a smaller cube's image is a mean of four, as suns may be one texel wide
 ROWS = 32  # at a time
 # For each face from the top: the axis in its middle, and those to its right and to its bottom, seen from inside.
 # +Z is in the middle of OpenEXR's latitude-longitude images, as -Z is in that of ours.

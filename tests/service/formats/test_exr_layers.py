@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from service.cli.program import main
 from service.problems import AssetError
 from service.server.assets import AssetStore
 from tests import asset_files as make
 from tests.exr_files import written, written_parts
+from tests.serving import Server
 
 RNG = np.random.default_rng(5)
 TEXELS = RNG.random((6, 10, 16)).astype(np.float32) + 0.1
@@ -134,3 +138,39 @@ def test_luminance_and_chroma_of_every_pixel_are_a_picture(store: AssetStore) ->
     planes = np.stack([y, picture[..., 0] / y - 1, picture[..., 2] / y - 1], axis=2)
     pixels, warnings, _ = added(store, written(planes, ("Y", "RY", "BY")))
     assert np.allclose(pixels, picture, atol=1e-5) and warnings == []
+
+
+def test_an_upload_is_answered_with_the_layers(server: Server) -> None:
+    answer = server.http.post("/v1/assets", content=of_channels(rgb("V.AO", "V.Combined")))
+    assert answer.status_code == 201
+    info = answer.json()
+    assert info["layers"] == ["V.AO", "V.Combined"]
+    assert info["warnings"][0]["detail"].startswith("layer V.Combined of V.AO, V.Combined is shown")
+    document = {
+        "version": 1,
+        "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
+        "materials": {},
+        "shapes": [],
+        "environment": {"type": "image", "asset": info["id"], "layer": "V.Normal"},
+    }
+    refused = server.http.post("/v1/renders", json={"scene": document})
+    assert refused.status_code == 422
+    (error,) = refused.json()["errors"]
+    assert error["pointer"] == "/scene/environment/layer" and "it has V.AO, V.Combined" in error["detail"]
+
+
+def test_the_command_names_the_layers_of_a_file_beside_the_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SUNBOX_DATA_DIR", str(tmp_path / "data"))
+    (tmp_path / "sky.exr").write_bytes(of_channels(rgb("V.AO", "V.Combined")))
+    document = {
+        "version": 1,
+        "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
+        "materials": {},
+        "shapes": [],
+        "environment": {"type": "image", "asset": "sky.exr", "layer": "V.Normal"},
+    }
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    assert main(["render", str(tmp_path / "scene.json"), "-o", str(tmp_path / "a.png")]) == 2
+    assert "/environment/layer: 'sky.exr': it has no layer 'V.Normal'; it has V.AO" in capsys.readouterr().err

@@ -58,6 +58,16 @@ def test_a_name_of_several_words_is_one_however_they_are_parted(said: str, name:
         assert found is not None and list(found.channels) == [role] and found.material == "", written
 
 
+@pytest.mark.parametrize(
+    "name", ["ORM Map", "Ambient Occlusion Roughness Metallic", "Occlusion Roughness Metalness Map"]
+)
+def test_packed_images_have_such_names_too(name: str) -> None:
+    for written in (name, name.replace(" ", "_"), name.replace(" ", "")):
+        found = meaning(f"Old Wood {written}")
+        assert found is not None and found.material == "Old_Wood"
+        assert found.channels == {"occlusion": "r", "roughness": "g", "metallic": "b"}
+
+
 def test_a_mask_beside_its_set_is_its_opacity(store: AssetStore) -> None:
     names = ("Old Wood Base Color", "old-wood_Opacity-Mask", "Old_Wood_NormalMap", "OldWood Ambient Occlusion")
     colours = {f"{name}.png": make.png(np.full((4, 4, 3), 40 * k + 20, np.uint8)) for k, name in enumerate(names)}

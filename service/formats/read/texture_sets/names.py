@@ -91,7 +91,8 @@ def _named() -> dict[str, tuple[dict[Role, str], bool | None]]:
                     name: ({"normal": ""}, directx) for mark in marks for name in (normal + mark, mark + normal)
                 }
     found |= {word: ({role: ""}, None) for role, words in WORDS.items() for word in words}
-    return found | {name: (channels, None) for name, channels in PACKED.items()}
+    packed = {name + kind: channels for name, channels in PACKED.items() for kind in ("", *KINDS)}
+    return found | {name: (channels, None) for name, channels in packed.items()}
 
 
 NAMES = _named()
