@@ -21,6 +21,7 @@ from service.pack import pack
 from service.problems import InvalidDocument, TooLarge
 from service.server.assets import AssetStore
 from tests.asset_files import png
+from tests.exr_files import written
 
 CONFIG = Config()
 RNG = np.random.default_rng(5)
@@ -204,6 +205,26 @@ def test_images_keep_their_bytes(store: AssetStore) -> None:
     assert (
         data in exported(scene({**QUAD, "material": "m"}, textures=textures, materials={"m": material}), store).data
     )
+
+
+def test_layers_of_one_image_are_images_apart(store: AssetStore) -> None:
+    texels = np.full((4, 4, 6), (0.25, 0.25, 0.25, 1, 0, 0), np.float32)
+    asset = store.add(written(texels, [f"{layer}.{channel}" for layer in ("AO", "beauty") for channel in "RGB"])).id
+    textures = {
+        "ao": {"asset": asset, "layer": "AO"},
+        "b": {"asset": asset, "layer": "beauty"},
+        "c": {"asset": asset},
+    }
+    materials = {name: {"type": "principled", "base_color": {"texture": name}} for name in textures}
+    shapes = [{**QUAD, "material": name} for name in textures]
+    made = exported(scene(*shapes, textures=textures, materials=materials), store)
+    assert len(tree_of(made)["images"]) >= 2
+    found = again(made, store)
+    shown = {
+        name: store.image(found["textures"][material["base_color"]["texture"]]["asset"]).pixels[0, 0].tolist()
+        for name, material in found["materials"].items()
+    }
+    assert shown["b"] == shown["c"] == [255, 0, 0] and shown["ao"][0] == shown["ao"][1] < 255
 
 
 BALL = {"type": "sphere", "center": [1, 2, 3], "radius": 0.5, "material": "m"}

@@ -20,6 +20,7 @@ from service.formats.read.materialx.importer import read_materialx
 from service.formats.types import AssetLimits, SceneFile
 from service.server.assets import AssetStore
 from tests.asset_files import png
+from tests.exr_files import written as layered
 from tests.serving import Server
 
 mx = pytest.importorskip("MaterialX")
@@ -200,3 +201,16 @@ def test_it_is_served_and_written_by_the_command(
     assert "lost: /shapes/0: MaterialX has materials only" in capsys.readouterr().err
     assert (tmp_path / "textures" / "coat.png").read_bytes() == IMAGE
     assert main(["import", str(tmp_path / "out.mtlx"), "-o", str(tmp_path / "again.json")]) == 0
+
+
+def test_a_layer_of_an_image_is_told(store: AssetStore) -> None:
+    """The file goes along as it is, and MaterialX' readers take their own layer of it."""
+    texels = np.full((4, 4, 6), 0.25, np.float32)
+    layers = layered(texels, [f"{layer}.{channel}" for layer in ("AO", "beauty") for channel in "RGB"])
+    textures = {"t": {"asset": store.add(layers).id, "layer": "AO"}}
+    material = {"type": "openpbr", "base_color": {"texture": "t"}}
+    exported = FORMATS["mtlx"].material_writer(
+        parse_scene({**LOOK, "materials": {"m": material}, "textures": textures}), store, Config()
+    )
+    assert list(exported.losses) == [("/materials/m/base_color", "that it is layer 'AO' of its image is not written")]
+    assert list(exported.beside.values()) == [layers]
