@@ -78,7 +78,8 @@ Path path_follow(Sampler rng, vec3 o, vec3 d, Medium medium, uint turn) {
             float share = direct_share(s, path.bounce);
             BsdfSample next = path_shade(s, here, m, lit, share, rng, path);
             if (!next.straight) path.lit = lit;
-            path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
+            bool crosses = dot(here.front, next.d) < 0.0 && !next.enters; // a walk comes out on this side
+            path.medium = interaction_medium(crosses, path.medium, here.beyond);
             if (next.enters) walk_enter(m, path);
             path_extend(next, share, s, rng, path);
             path_trace_ahead(rng, path);

@@ -73,6 +73,14 @@ def test_what_is_white_gains_nothing_and_loses_what_the_steps_cut_off(gpu: Rende
         assert 0.95 < mean < 1.003
 
 
+def test_what_comes_out_is_around_the_body_again(gpu: Renderer) -> None:
+    """Of a body of which half is clear, and dark inside: the other half of the light walks, and comes out whole."""
+    half = principled(1.0, subsurface_radius=0.1, specular=0, ior=1, roughness=0.5, transmission=0.5)
+    dark = {**half, "attenuation_color": 0.1, "attenuation_distance": 0.05}
+    image = render(gpu, document([ball("m")], {"m": dark}, camera=CAMERA, **WHITE), 256, width=16, height=16)
+    np.testing.assert_allclose(image[..., :3].mean((0, 1)), 0.5, atol=0.01)
+
+
 def test_estimators_agree(gpu: Renderer) -> None:
     """Also with other things in the body, which a walk passes, and half of the light that does not walk."""
     shapes = [
