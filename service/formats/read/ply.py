@@ -16,6 +16,7 @@ from service.formats.errors import ParseError
 from service.formats.read.bad_elements import (
     NO_INDEX,
     Mask,
+    are_places,
     counted,
     finite_rows,
     left_out,
@@ -126,7 +127,8 @@ def read_textured_ply(data: memoryview) -> PlyMesh:
     if not len(faces.counts):
         raise ParseError("it has no faces")
     used = np.zeros(len(vertices), bool)
-    used[faces.corners[(faces.corners >= 0) & (faces.corners < len(vertices))]] = True
+    if not are_places(vertices).all():
+        used[faces.corners[(faces.corners >= 0) & (faces.corners < len(vertices))]] = True
     whole, reason = whole_faces(vertices, faces.corners, faces.counts, counted("face"))
     if not whole.all():
         refuse_nothing(whole, reason)

@@ -94,7 +94,7 @@ def test_packages_that_lead_out_or_blow_up_are_refused(store: AssetStore) -> Non
         (bomb, "are allowed, for a zip of"),
         (usdz({"a.usda": b"nonsense"}), "neither with #usda nor"),
         (root.replace(b"[4]", b"[400]"), "corners make its faces"),
-        (root.replace(b"2, 3]", b"2, 9]"), "names point 9"),
+        (root.replace(b"2, 3]", b"2, 9]"), "names vertex 9; there are 4"),
         (root.replace(b"(1, 1, 0)", b"(1, nan, 0)"), "not finite"),
         (root.replace(b"def Mesh", b"def Nonsense"), "no triangles"),
         (root.replace(b"(1, 1, 0)", b"(1, 1"), "cannot be read"),

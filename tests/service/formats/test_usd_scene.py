@@ -359,3 +359,19 @@ def test_all_of_it_as_one_mesh(store: AssetStore) -> None:
     whole = store.mesh(info.id)
     assert len(whole.faces) == 2 + 2 + 12 and info.triangles == len(whole.faces)
     assert np.array(whole.bounds).tolist() == info.bounds == [[-1, -1, -1], [1, 1, 4]]
+
+
+@pytest.mark.usd
+def test_a_cage_with_a_bad_face_is_told_as_any_other(store: AssetStore) -> None:
+    """Whether subdivision would bend it is asked of the faces that are left."""
+    layer = b"""#usda 1.0
+def Mesh "M" {
+    int[] faceVertexCounts = [4, 3, 3]
+    int[] faceVertexIndices = [0, 1, 2, 3, 0, 1, 9, 0, 1, 4]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0), (nan, 0, 0)]
+}
+"""
+    info = store.add(layer, filename="a.usda")
+    details = [warning["detail"] for warning in info.warnings or []]
+    assert info.triangles == 2 and any("2 face" in detail for detail in details)
+    assert any("subdivision" in detail for detail in details)

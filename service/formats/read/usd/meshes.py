@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pxr import Usd, UsdGeom
 
 from service.formats.errors import ParseError
+from service.formats.read.bad_elements import counted, left_out, unused_places, whole_faces
 from service.formats.read.polygons import Longs, triangulate
 from service.formats.read.raw_mesh import area_weighted
 from service.formats.read.scenes.warnings import Warnings
@@ -61,15 +62,17 @@ class Mesh:
         self.face_count = len(counts)
         if len(corners) != counts.sum() or (len(counts) and counts.min() < 0):
             raise ParseError(f"{counts.sum()} corners make its faces, and it has {len(corners)}", self.pointer)
-        if len(corners) and not 0 <= corners.min() <= corners.max() < len(self.points):
-            raise ParseError(f"a face names point {corners.max()}; there are {len(self.points)}", self.pointer)
-        self._corners, self._counts = corners, counts
+        self._corners = corners
         self._face_of_corner = np.repeat(np.arange(len(counts)), counts)
-        whole = counts >= 3
+        whole, reason = whole_faces(self.points, corners, counts, counted("face"))
+        if reason:
+            notes.leave_out(self.pointer, left_out(int((~whole).sum()), "face", reason))
+        self.points = self._finite_points(corners)
         holes = _array(mesh.GetHoleIndicesAttr().Get(time)).astype(np.int64)
         whole[holes[(holes >= 0) & (holes < len(counts))]] = False
         places = np.flatnonzero(whole[self._face_of_corner])
-        local = triangulate(self.points, corners[places], counts[whole])
+        self._whole = corners[places], counts[whole]
+        local = triangulate(self.points, *self._whole)
         self.triangles: Longs = places[local]  # (m, 3): places among the corners
         if mesh.GetOrientationAttr().Get(time) == LEFT:
             self.triangles = self.triangles[:, ::-1]
@@ -78,6 +81,14 @@ class Mesh:
         self.is_cage = scheme in ("catmullClark", "loop")
         self._api = UsdGeom.PrimvarsAPI(prim)
         self._normals = self._read_normals(mesh)
+
+    def _finite_points(self, corners: Longs) -> Array:
+        used, told = np.zeros(len(self.points), bool), list[str]()
+        used[corners[(corners >= 0) & (corners < len(used))]] = True
+        points = unused_places(self.points, counted("point"), used, told)
+        for detail in told:
+            self._notes.add(self.pointer, detail)
+        return points
 
     @property
     def is_smooth(self) -> bool:
@@ -148,7 +159,7 @@ class Mesh:
             rows = mesh.GetNormalsAttr().Get(self._time)
             if rows:
                 found = self._values("normals", rows, None, str(mesh.GetNormalsInterpolation()), 3)
-        if self.is_cage and bends(self.points, self._corners, self._counts):
+        if self.is_cage and bends(self.points, *self._whole):
             self._notes.add(self.pointer, "subdivision is not supported; the surface is shown as its cage")
         if found is not None or not self.is_cage or not len(self.triangles):
             return found
