@@ -26,7 +26,7 @@ exr_layers   the layers of an OpenEXR file, and which of them is shown
 exr_cube     OpenEXR files of six faces -> latitude-longitude images
 hdr_lines    Radiance HDR: flat scan lines and the older run lengths
 measured     measured reflection
-foreign        FBX, COLLADA, 3DS, X3D, 3MF and STEP by libraries that write glTF
+foreign      FBX, COLLADA, 3DS, X3D, 3MF and STEP by libraries that write glTF
 usd          USD
 materialx    MaterialX
 texture_sets  images that make materials by their names
