@@ -12,8 +12,8 @@ from service.ipc.messages import EvaluateBsdf, Evaluated, Failed, Frame, FromRen
 from service.problems import Internal, Unavailable
 from service.renderers.protocol import Renderers
 from service.renderers.statistics import Kind
+from service.system.executors import KeyedLocks
 from service.system.shares import Shares
-from service.system.turns import KeyedLocks
 
 T = TypeVar("T", Frame, Evaluated)
 

@@ -1,16 +1,18 @@
-"""Threads for the server's slow work: neither the event loop nor another kind of work waits for it."""
+"""Threads for the server's slow work: neither the event loop nor another kind of work waits for it; and locks by
+caller, for what each does one at a time."""
 
 from __future__ import annotations
 
 import asyncio
 import threading
+import weakref
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from service.system.cpu import raise_thread_niceness, working_niceness
 from service.system.shares import CALLER
@@ -21,6 +23,7 @@ NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
 WRITING_NICENESS = 12  # of threads that write large pictures to files while every stream goes on
 
 T = TypeVar("T")
+K = TypeVar("K", bound=Hashable)
 
 
 def _yield_to_others(niceness: int = NICENESS) -> None:
@@ -122,3 +125,13 @@ class ClientExecutor:
 
     def close(self) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+class KeyedLocks(Generic[K]):
+    """A lock for each key, on the event loop: `async with locks.of(caller):` lets a caller do one thing at a time."""
+
+    def __init__(self) -> None:
+        self._locks: weakref.WeakValueDictionary[K, asyncio.Lock] = weakref.WeakValueDictionary()
+
+    def of(self, key: K) -> asyncio.Lock:
+        return self._locks.setdefault(key, asyncio.Lock())

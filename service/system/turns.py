@@ -5,13 +5,11 @@ by measured seconds.
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import threading
-import weakref
 from bisect import bisect_left, insort
 from collections import Counter
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -21,7 +19,6 @@ from service.system.shares import CALLER
 REMEMBERED = 1000  # callers whose last turn counts
 
 T = TypeVar("T")
-K = TypeVar("K", bound=Hashable)
 
 
 class Turns:
@@ -161,13 +158,3 @@ class FairRoom:
 
     def _next(self) -> _Waiter | None:
         return self._waiting.first(self._taken.__getitem__, may=lambda caller: self._taken[caller] < self._each)
-
-
-class KeyedLocks(Generic[K]):
-    """A lock for each key, on the event loop: `async with locks.of(caller):` lets a caller do one thing at a time."""
-
-    def __init__(self) -> None:
-        self._locks: weakref.WeakValueDictionary[K, asyncio.Lock] = weakref.WeakValueDictionary()
-
-    def of(self, key: K) -> asyncio.Lock:
-        return self._locks.setdefault(key, asyncio.Lock())

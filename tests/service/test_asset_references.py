@@ -24,7 +24,7 @@ from tests.serving import SCENE, SMALL, Client, Server
 BERT = {"authorization": "Bearer bert-key"}
 MISSING = "sha256:" + "0" * 64
 FACES = ("px", "nx", "py", "ny", "pz", "nz")
-NAMES = {"name", "texture", "material"}  # the texts of a document that name something in it, or nothing
+NAMES = {"name", "texture", "material", "layer"}  # the texts of a document that name something in it, or nothing
 Step = str | int
 Place = tuple[Step, ...]
 

@@ -45,6 +45,7 @@ BODIES: dict[Kind, Any] = {
     "conversion": {"material": MATERIAL, "to": "microfacet"},
     "comparison": {"a": REQUEST, "b": {**REQUEST, "settings": {**SETTINGS, "seed": 2}}},
     "export": {"scene": LARGE, "format": "glb"},
+    "recipe": {"sunbox": "1", "scene": LARGE, "settings": {}, "samples": 1, "view": {}},
 }
 
 

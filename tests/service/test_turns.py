@@ -112,7 +112,7 @@ def test_turns_of_long_ago_are_forgotten() -> None:
 
 def test_there_is_no_other_order() -> None:
     """Nothing else in the service remembers whose turn was when; the scheduler divides a renderer's measured time."""
-    kept = re.compile(r"\b_?last\w*\b.*\bturn|# .*last turn (counts|is)|WeakValueDictionary\[.*asyncio\.Lock\]")
+    kept = re.compile(r"\b_?last\w*\b.*\bturn|# .*last turn (counts|is)")
     found = {
         str(path.relative_to(SERVICE))
         for path in SERVICE.rglob("*.py")

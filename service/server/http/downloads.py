@@ -23,9 +23,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import TooLarge, Unavailable
 from service.system.disk_usage import FULL, trouble
+from service.system.executors import KeyedLocks
 from service.system.memory import MemoryBudget, Reservation
 from service.system.shares import Shares
-from service.system.turns import KeyedLocks
 
 SMALL = 1 << 20  # bytes of an answer that is made in memory, and needs no disk
 PIECE = 1 << 18  # bytes that are read and sent at a time

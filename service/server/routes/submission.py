@@ -24,8 +24,7 @@ from service.server.requests.request_parser import ParsedRequest
 from service.server.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.server.storage.asset_access import NO_USES, AllowedUses, Use
 from service.server.storage.quota import Quota
-from service.system.executors import opening, packing
-from service.system.turns import KeyedLocks
+from service.system.executors import KeyedLocks, opening, packing
 
 ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an option in a shell
 

@@ -17,6 +17,7 @@ from service.config import Config
 from service.document import parse_scene
 from service.exports import FORMATS, Exported
 from service.formats.read.materialx.importer import read_materialx
+from service.formats.read.references import Finder
 from service.formats.types import AssetLimits, SceneFile
 from service.server.assets import AssetStore
 from tests.asset_files import png
@@ -100,7 +101,7 @@ def written(store: AssetStore, materials: dict[str, Any], textures: dict[str, An
 
 def again(exported: Exported) -> SceneFile:
     files = {"a.mtlx": exported.data, **exported.beside}
-    return read_materialx(list(files), files.__getitem__, AssetLimits())
+    return read_materialx(["a.mtlx"], Finder(files), files.__getitem__, AssetLimits())
 
 
 def same(found: Any, wanted: Any) -> None:

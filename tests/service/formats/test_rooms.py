@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from service.formats.read.gltf.importer import read_scene
-from service.formats.read.obj.importer import read_obj_scene
 from service.formats.read.scenes.framing import framed
 from service.formats.read.scenes.plain_mesh import plain_scene
 from service.formats.read.scenes.rays import Placed
 from service.formats.read.scenes.room import stand_inside
+from service.formats.read.zips.importer import read_zip
 from service.formats.sandbox.readers import parse_mesh
 from service.formats.types import AssetLimits
 from tests import asset_files as make
@@ -141,7 +141,7 @@ def obj(*parts: Placed) -> str:
 def test_every_importer_looks_for_rooms() -> None:
     limits = AssetLimits()
     from_gltf = read_scene(glb(room(), TABLE), limits)
-    from_obj = read_obj_scene(zipped({"m.obj": obj(room(), TABLE)}), limits)
+    from_obj = read_zip(zipped({"m.obj": obj(room(), TABLE)}), limits)
     for file in (from_gltf, from_obj):
         assert is_inside(file.document["camera"]) and len(file.document["lights"]) == 1 and not file.lit
         assert any("the camera stands inside" in warning["detail"] for warning in file.warnings)

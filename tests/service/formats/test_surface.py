@@ -15,6 +15,7 @@ from service.document.material.principled import index_of_specular, roughness_of
 from service.document.texture import ColorTexture, NormalTexture, ScalarTexture
 from service.formats import types
 from service.formats.read.materialx.importer import read_materialx
+from service.formats.read.references import Finder
 from service.formats.surface import MODELS, gltf, open_pbr, outputs
 from service.formats.surface.outputs import Outputs, plain
 from service.formats.types import AssetLimits
@@ -226,7 +227,7 @@ def test_a_mtlx_means_what_any_other_file_means(model: str) -> None:
         for k, case in enumerate(cases)
     ]
     text = mtlx_files.mtlx(*elements)
-    file = read_materialx(["a.mtlx"], lambda name: text, AssetLimits())
+    file = read_materialx(["a.mtlx"], Finder(["a.mtlx"]), lambda name: text, AssetLimits())
     for case, found in zip(cases, file.document["materials"].values(), strict=True):
         same(found, Said(model, case).material)
 
