@@ -10,7 +10,6 @@ import { isUnderNoSky, studio } from "./document/lighting.js";
 import { unpacked } from "./document/material-set.js";
 import { pointer } from "./lib/patch.js";
 import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
-import { readRecipe } from "./document/recipe.js";
 import { fields, materialModels } from "./server/schema.js";
 import { revived } from "./document/share.js";
 import { pictured } from "./document/textures.js";
@@ -110,6 +109,7 @@ export class Importer {
     const kind = kindOf(file);
     if (!kind) throw new Error(`Sunbox can open ${ACCEPT.replaceAll(",", ", ")}.`);
     if (kind === "json") return this.#takeJson(JSON.parse(await file.text()), file, way);
+    const { readRecipe } = await import("./document/recipe-reader.js");
     const recipe = way === "add" ? null : await readRecipe(file); // what is added is an image like any other
     if (recipe) {
       this.reopen(recipe, stem(file));

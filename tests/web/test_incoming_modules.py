@@ -201,7 +201,7 @@ def test_a_pose_keeps_what_was_done_by_hand(page: Page) -> None:
 
 
 RECIPE = """async (pictures) => {
-    const { readRecipe } = await import("/document/recipe.js");
+    const { readRecipe } = await import("/document/recipe-reader.js");
     return Promise.all(pictures.map((bytes) => readRecipe(new File([Uint8Array.from(bytes)], "a"))));
 }"""
 
