@@ -177,15 +177,17 @@ def _chunk(id: int, *parts: bytes) -> bytes:
     return struct.pack("<HI", id, 6 + len(body)) + body
 
 
-def three_ds() -> bytes:
+def three_ds(texture: str = "") -> bytes:
     """A cube of 3DS with a green material, z up."""
     color = _chunk(0xA020, _chunk(0x0011, bytes([25, 178, 25])))
-    material = _chunk(0xAFFF, _chunk(0xA000, b"Green\0"), color)
+    name = _chunk(0xA300, texture.encode() + b"\0")
+    material = _chunk(0xAFFF, _chunk(0xA000, b"Green\0"), color, _chunk(0xA200, name) if texture else b"")
     triangles = [each for a, b, c, d in QUADS for each in ((a, b, c), (a, c, d))]
     points = struct.pack("<H", 8) + b"".join(struct.pack("<3f", *corner) for corner in CORNERS)
     group = _chunk(0x4130, b"Green\0", struct.pack("<H", 12), struct.pack("<12H", *range(12)))
     faces = struct.pack("<H", 12) + b"".join(struct.pack("<4H", *each, 7) for each in triangles)
-    mesh = _chunk(0x4100, _chunk(0x4110, points), _chunk(0x4120, faces, group))
+    uvs = struct.pack("<H16f", 8, *(float(each) for corner in CORNERS for each in corner[:2]))
+    mesh = _chunk(0x4100, _chunk(0x4110, points), _chunk(0x4120, faces, group), _chunk(0x4140, uvs))
     return _chunk(
         0x4D4D, _chunk(0x0002, struct.pack("<I", 3)), _chunk(0x3D3D, material, _chunk(0x4000, b"Cube\0", mesh))
     )

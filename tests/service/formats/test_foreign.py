@@ -17,6 +17,7 @@ from service.cli.program import main
 from service.config import Config
 from service.formats.errors import ParseError
 from service.formats.formats import FOREIGN, advice, sniff
+from service.formats.read.archive import zipped
 from service.formats.read.foreign.glb import Glb
 from service.formats.sandbox.sandbox import Sandbox
 from service.formats.types import SceneFile
@@ -156,6 +157,21 @@ def test_over_rest_and_on_the_command_line(server: Server, tmp_path: Path, forma
     (tmp_path / f"a.{format}").write_bytes(FILES[format])
     assert main(["import", str(tmp_path / f"a.{format}"), "-o", str(tmp_path / "a.json")]) == 0
     assert json.loads((tmp_path / "a.json").read_text())["shapes"]
+
+
+@pytest.mark.models
+def test_a_texture_in_a_zip_stands_in_the_place_of_the_colour(sandbox: Sandbox) -> None:
+    """Of 3DS, whose material is green: where the image is there that counts, and where it is not the colour."""
+    textured = three_ds("wood.png")
+    scene = sandbox.parse_scene("zip", zipped({"m/a.3ds": textured, "tex/Wood.PNG": square((9, 9, 9), "PNG")}))
+    assert material(scene, "Green")["base_color"] == {
+        "texture": next(iter(scene.document["textures"])),
+        "factor": 1.0,
+    }
+    assert "the only file of that name" in details(scene)
+    scene = sandbox.parse_scene("zip", zipped({"m/a.3ds": textured}))
+    assert material(scene, "Green")["base_color"] == pytest.approx([25 / 255, 178 / 255, 25 / 255], abs=1e-6)
+    assert "is not there" in details(scene)
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,9 @@ def converted(format: str, data: bytes, find: Find) -> Glb:
     for material in file.root.get("materials", []):
         _material(material, file, is_srgb=format == "3mf")
     file.embed(lambda name: find(_first(name)))
+    for values in (material.get("pbrMetallicRoughness", {}) for material in file.root.get("materials", [])):
+        if "baseColorTexture" in values:  # in these formats it stands in the place of the colour
+            values["baseColorFactor"] = [1.0, 1.0, 1.0, values.get("baseColorFactor", [1.0] * 4)[3]]
     return file
 
 
