@@ -115,6 +115,7 @@ def test_a_picture_is_a_scene_in_all_four_ways(
     path.write_bytes(answer.content)
     id = server.http.post("/v1/assets", content=answer.content, params={"filename": path.name}).json()["id"]
     assert server.http.get(f"/v1/assets/{id}/scene").json() == document
+    assert server.http.get(f"/v1/assets/{id}/materials").status_code == 404, "it is no set of materials"
     with sunbox.Client(server.url) as client:
         assert client.import_scene(path) == document
     assert main(["import", str(path), "-o", str(tmp_path / "a.json")]) == 0

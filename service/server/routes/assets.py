@@ -224,24 +224,8 @@ async def materials(request: Request, id: answers.AssetId) -> Response:
 
     storage, owner = app_state(request).storage, owner_of(request)
 
-    def made_from() -> bytes | None:
-        storage.access.check(owner, id)
-        if storage.assets.info(id).kind != "image":
-            return None
-        if (text := metadata_text(storage.assets.read(id))) is None:
-            raise NotFound(f"{id[:100]} is an image that Sunbox did not make: it has no scene in its metadata")
-        return text
-
-    if (text := await opening(made_from, caller_of(request))) is not None:
-        state, values = app_state(request), Reservation()
-        try:
-            hold = partial(state.memory.hold, "bodies", values)
-            found = await state.bodies.parsed("recipe", bytearray(text), caller_of(request), hold)
-            return Response(found.body, media_type=JSON)
-        finally:
-            state.memory.release(values)
-
     def read() -> Response:
+        storage.access.check(owner, id)
         imported = storage.assets.materials(id)
         storage.shares.imported(owner, id, imported.references())
         document = imported.document
