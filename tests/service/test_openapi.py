@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import httpx
@@ -153,6 +154,23 @@ def test_a_mesh_is_two_models(description: Any) -> None:
     assert both[0] - both[1] == {"asset"} and {"vertices", "faces"} <= both[1] - both[0]
     for model in models:
         assert set(model["required"]) <= set(model["properties"]) and model["additionalProperties"] is False
+
+
+def test_a_discriminator_names_objects(description: Any) -> None:
+    """Not a union: generators have no one model then to choose."""
+    schemas = description["components"]["schemas"]
+    found = [each for each in _objects(description) if "mapping" in each.get("discriminator", ())]
+    assert found
+    for each in found:
+        for reference in each["discriminator"]["mapping"].values():
+            assert schemas[reference.rpartition("/")[2]]["type"] == "object", reference
+
+
+def _objects(value: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(value, dict):
+        yield value
+    for child in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _objects(child)
 
 
 def test_information_has_the_described_shape(server: Server, description: Any) -> None:
