@@ -63,12 +63,14 @@ class InvalidDocument(ServiceError):
 class AssetError(ServiceError):
     """An asset that is missing, unreadable or not what its use asks for; callers that know the field add the pointer.
 
-    `place` is a pointer into the asset's own JSON, where it has one.
+    `place` is a pointer into the asset's own JSON, where it has one. `choices` are the models of a zip that holds
+    several.
     """
 
-    def __init__(self, detail: str = "", place: str = "") -> None:
+    def __init__(self, detail: str = "", place: str = "", choices: tuple[str, ...] = ()) -> None:
         super().__init__(detail)
         self.place = place
+        self.choices = choices
 
 
 class Unauthorized(ServiceError):
@@ -199,6 +201,8 @@ def problem(error: Exception) -> dict[str, Any]:
         body["errors"] = [{"pointer": error.pointer, "detail": error.detail}]
     elif isinstance(error, AssetError) and error.place:
         body["errors"] = [{"pointer": error.place, "detail": error.detail}]
+    if isinstance(error, AssetError) and error.choices:
+        body["choices"] = list(error.choices)
     return body
 
 

@@ -117,7 +117,11 @@ export class Importer {
     }
     const { checkFile } = await import("./lib/check-file.js");
     await checkFile(file, this.formats());
-    const info = await this.upload(file); // before anything is asked: a broken file is no whole scene
+    const one = await this.#uploadOne(file); // before anything is asked: a broken file is no whole scene
+    return one && this.#takeUploaded(one.info, one.file, at, way);
+  }
+
+  async #takeUploaded(info, file, at, way) {
     if (info.kind === "materials") return this.#takeMaterials(info, file, at);
     if (info.kind === "scene") {
       this.messages.hide("upload");
@@ -210,9 +214,22 @@ export class Importer {
     }
   }
 
-  async upload(file) {
+  async upload(file, entry) {
     const set = this.messages.show("upload", { title: `Sending ${file.name}`, lasting: true, progress: true });
-    return upload(file, set);
+    return upload(file, set, entry);
+  }
+
+  // {info, file} of what a file is, or of the one of a zip's models that the person takes; null where they take none.
+  async #uploadOne(file) {
+    try {
+      return { info: await this.upload(file), file };
+    } catch (problem) {
+      if (!problem.choices?.length) throw problem;
+      this.messages.hide("upload");
+      const { askModel } = await import("./zip-models.js");
+      const entry = await askModel(file, problem.choices);
+      return entry && { info: await this.upload(file, entry), file: new File([], entry.split("/").at(-1)) };
+    }
   }
 
   async #takeJson(document, file, way) {

@@ -142,7 +142,9 @@ def layered(key: str, layer: str) -> str:
 def refused(name: str, error: ParseError) -> AssetError | NotProvided:
     """The error for a caller whose file is not read."""
     detail = f"{name}: {error.detail if error.pointer == LAYER else error}"
-    return NotProvided(detail) if isinstance(error, MissingExtra) else AssetError(detail, error.pointer)
+    if isinstance(error, MissingExtra):
+        return NotProvided(detail)
+    return AssetError(detail, error.pointer, error.choices)
 
 
 def describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:

@@ -7,12 +7,14 @@ class ParseError(Exception):
     """A file was refused; the message says to its author what is wrong and where.
 
     `pointer` (RFC 6901) is the place in the file's own JSON, where it has one; of an OBJ's files FILE or FILE:LINE.
+    `choices` are the models of a zip that holds several.
     """
 
-    def __init__(self, detail: str, pointer: str = "") -> None:
+    def __init__(self, detail: str, pointer: str = "", choices: tuple[str, ...] = ()) -> None:
         super().__init__(f"{pointer}: {detail}" if pointer else detail)
         self.detail = detail
         self.pointer = pointer
+        self.choices = choices
 
 
 class MissingExtra(ParseError):

@@ -8,15 +8,17 @@ const root = new URL("v1/", document.baseURI);
 const PROTOCOL = "sunbox.v1";
 const LOOK_MS = 1000; // between two looks at how far a comparison is
 
-// What the service refused, as RFC 9457 tells it: `detail`, `status` and `errors` [{pointer, detail}].
+// What the service refused, as RFC 9457 tells it: `detail`, `status`, `errors` [{pointer, detail}] and, of a
+// zip with several models, their names as `choices`.
 export class Problem extends Error {
   // `type` is "about:blank" where only the status says what is wrong.
-  constructor({ type = "about:blank", title, detail, status, errors = [] }) {
+  constructor({ type = "about:blank", title, detail, status, errors = [], choices = [] }) {
     super(detail || title || "The server refused the request.");
     this.isGeneric = type === "about:blank";
     this.title = title;
     this.status = status;
     this.errors = errors;
+    this.choices = choices;
   }
 }
 
@@ -151,11 +153,13 @@ export const serverUrl = () => new URL("..", root).href.replace(/\/$/, "");
 
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
 
-// Uploads a file: what the server says of it, {id, kind, ...}. `progress(share)` is told how much has gone.
-export function upload(file, progress) {
+// Uploads a file, or of a zip of several models that which `entry` names: what the server says of it, {id, kind, ...}.
+// `progress(share)` is told how much has gone.
+export function upload(file, progress, entry) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest(); // fetch does not tell how far a body is
-    request.open("POST", new URL(`assets?filename=${encodeURIComponent(file.name.slice(-200))}`, root));
+    const query = new URLSearchParams({ filename: file.name.slice(-200), ...(entry ? { entry } : {}) });
+    request.open("POST", new URL(`assets?${query}`, root));
     for (const [name, value] of Object.entries(authorization())) request.setRequestHeader(name, value);
     request.setRequestHeader("content-type", "application/octet-stream");
     request.responseType = "json";

@@ -79,7 +79,7 @@ def _answer(request: dict[str, Any], source: int) -> tuple[dict[str, Any], int]:
             fd, table = publish(arrays)
             return {"arrays": table, "is_spent": assimp.is_loaded(), **facts}, fd
     except ParseError as error:
-        reply = {"error": error.detail[:2000], "pointer": error.pointer[:1000]}
+        reply = {"error": error.detail[:2000], "pointer": error.pointer[:1000], "choices": error.choices}
         return reply | {"is_missing": isinstance(error, MissingExtra)}, -1
     except Exception as error:
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:

@@ -229,7 +229,7 @@ def _death(child: Child, limits: AssetLimits) -> str:
 def _result(reply: dict[str, Any], fd: int) -> Parsed:
     if "error" in reply:
         kind = MissingExtra if reply.get("is_missing") is True else ParseError
-        raise kind(str(reply["error"]), str(reply.get("pointer", "")))
+        raise kind(str(reply["error"]), str(reply.get("pointer", "")), tuple(map(str, reply.get("choices", ()))))
     try:
         arrays = adopt(fd, reply["arrays"])
     finally:

@@ -57,6 +57,7 @@ class Problem(BaseModel):
     status: int
     detail: str
     errors: list[FieldProblem] = Field(default_factory=list)
+    choices: list[str] = Field(default_factory=list, description="The models of a zip that holds several.")
 
 
 class Named(BaseModel):

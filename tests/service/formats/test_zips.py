@@ -268,6 +268,7 @@ def test_several_models_over_rest(server: Server) -> None:
     refused = server.http.post("/v1/assets", content=data)
     assert refused.status_code == 422
     assert "the zip holds 2 models, a.stl and b.ply" in refused.json()["detail"]
+    assert refused.json()["choices"] == ["a.stl", "b.ply"]
     taken = server.http.post("/v1/assets", params={"entry": "b.ply", "filename": "x.zip"}, content=data)
     assert taken.status_code == 201, taken.text
     assert taken.json()["id"] == "sha256:" + hashlib.sha256(PLY).hexdigest()

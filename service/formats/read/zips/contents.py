@@ -13,6 +13,7 @@ from service.formats.read.references import Finder
 
 MODELS = ("gltf", "glb", "obj", "ply", "stl", "usd", *formats.MODELS)
 MOST_NAMED = 20  # models in a message
+MOST_CHOICES = 500  # models to choose from
 PACKAGE, ZIP, MATERIALX = ".usdz", ".zip", "mtlx"
 START_OF_ZIP = b"PK\x03\x04"
 READ = "glTF, OBJ, PLY, STL, USD, FBX, COLLADA, 3DS, X3D, 3MF or MaterialX"
@@ -65,7 +66,8 @@ def chosen(found: Contents, entry: str | None) -> str | None:
     if len(found.models) > 1:
         named = listed(list(found.models), MOST_NAMED)
         how = "choose one by its name: ?entry=NAME, on the command line --entry NAME"
-        raise ParseError(f"the zip holds {len(found.models)} models, {named}; {how}")
+        choices = tuple(found.models)[:MOST_CHOICES]
+        raise ParseError(f"the zip holds {len(found.models)} models, {named}; {how}", choices=choices)
     return next(iter(found.models), None)
 
 
