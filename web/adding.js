@@ -92,11 +92,10 @@ export class Adder {
     const copy = original.name ? { ...original, name: another(original.name, scene[kind]) } : original;
     if (kind === "lights") return this.acts.add(kind, this.#apart(copy));
     const own = (await this.controller.boxes())[Number(thing.split("/")[2])];
-    if (own && solids([own], this.acts.camera.position).length) return this.#put([copy], { own, around: await this.#surroundings() });
+    if (own && solids([own], this.acts.camera.position).length)
+      return this.#put([copy], { own, around: await this.#surroundings() });
     // A floor or a wall comes in front of itself; what can't be measured goes aside.
-    const away = isFlat(original)
-      ? normalize(KINDS[original.type].normal(original))
-      : axes(this.acts.camera).right;
+    const away = isFlat(original) ? normalize(KINDS[original.type].normal(original)) : axes(this.acts.camera).right;
     return this.acts.add(kind, moved(copy, scale(away, this.controller.radius())));
   }
 
@@ -173,7 +172,8 @@ export class Adder {
     const placed = isMoved ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
     const stand = isMoved ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;
     if (stand) remember(placed, stand);
-    const isSeen = !stand || (isInSight(camera, this.controller.aspect, stand) && !(how.isFramed && this.#isSmall(stand)));
+    const isSeen =
+      !stand || (isInSight(camera, this.controller.aspect, stand) && !(how.isFramed && this.#isSmall(stand)));
     this.acts.change({
       scene: {
         ...scene,

@@ -129,6 +129,7 @@ export class Importer {
       return chosen === null ? false : this.#takeScene(info, file, chosen);
     }
     if (info.kind === "mesh") return this.#takeMesh(info, file, way);
+    const kind = kindOf(file);
     if (kind === "table") this.#putTable(info, file);
     else if (kind === "measurement") await this.#takeMeasured(info, file, at);
     else if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id }, undefined, file.name);

@@ -186,12 +186,7 @@ export function laterParts({
     finals,
     // Has them ready for a hand, now that nothing waits for the network.
     prepare() {
-      const modules = [
-        import("./document/dressing.js"),
-        import("./lib/ask.js"),
-        import("./lib/name-entry.js"),
-        import("./keys-sheet.js"),
-      ];
+      const modules = [import("./document/dressing.js"), import("./lib/ask.js"), import("./lib/name-entry.js")];
       if (ui.state.drawer === "environments") turn.get().catch(complain);
       return Promise.allSettled([...all.map((part) => part.get()), ...modules]);
     },

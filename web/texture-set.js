@@ -32,7 +32,10 @@ export function heading(materials, warnings) {
   const images = new Set(textures.filter(Boolean)).size;
   const left = warnings.filter(({ detail }) => detail.includes("left out"));
   const others = left.filter(({ detail }) => !detail.startsWith("ambient occlusion"));
-  const parts = [...(others.length < left.length ? ["AO"] : []), ...(others.length ? [amount(others.length, "file")] : [])];
+  const parts = [
+    ...(others.length < left.length ? ["AO"] : []),
+    ...(others.length ? [amount(others.length, "file")] : []),
+  ];
   return `${name}: ${images ? amount(images, "image") : "no images"}${parts.length ? `, ${parts.join(" and ")} left out` : ""}`;
 }
 

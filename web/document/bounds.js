@@ -15,7 +15,9 @@ const asked = new Map(); // the answers about meshes that were not uploaded here
 
 // Has the boxes of these shapes' meshes known, as `describe(asset)` promises {bounds}; of some there are none.
 export function learn(shapes, describe) {
-  const files = shapes.map(({ asset }) => asset).filter((asset) => asset && !measured.has(asset) && !asked.has(asset));
+  const files = shapes
+    .map(({ asset }) => asset)
+    .filter((asset) => asset && !measured.has(asset) && !asked.has(asset));
   for (const asset of new Set(files)) {
     const answer = describe(asset).then(
       ({ bounds }) => bounds && measure(asset, bounds),
@@ -35,7 +37,8 @@ export function see({ asset, transform }, cloud) {
 }
 
 // Points of a shape before its transform, or null where neither the document nor its file tells.
-const points = (shape) => KINDS[shape.type].points?.(shape) ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
+const points = (shape) =>
+  KINDS[shape.type].points?.(shape) ?? measured.get(shape.asset) ?? seen.get(shape.asset) ?? null;
 
 // {center, radius} of a cloud of points: around the middle of its box.
 export function around(cloud) {

@@ -25,7 +25,10 @@ export function byBox(scene, name, extent) {
   const textures = { ...scene.textures };
   const shown = texturesOf(material, textures);
   const own = (texture) =>
-    users({ materials: { [name]: material }, textures: Object.fromEntries(shown.map((each) => [each, textures[each]])) }, texture);
+    users(
+      { materials: { [name]: material }, textures: Object.fromEntries(shown.map((each) => [each, textures[each]])) },
+      texture,
+    );
   const given = {}; // old names to new ones
   for (const each of shown) {
     const isMine = own(each) === users(scene, each);

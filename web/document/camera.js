@@ -61,7 +61,8 @@ const KINDS = {
   perspective: {
     ...flat,
     halfHeight: ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2),
-    direction: (camera, x, y, frame, aspect) => add(frame.forward, across(halfHeight(camera, 1), x, y, frame, aspect)),
+    direction: (camera, x, y, frame, aspect) =>
+      add(frame.forward, across(halfHeight(camera, 1), x, y, frame, aspect)),
   },
   orthographic: {
     ...flat,
@@ -77,7 +78,11 @@ const KINDS = {
     halfHeight: (_, distance) => (distance * Math.PI) / 2,
     project(_, way, { right, up, forward }) {
       const [x, y, z] = [right, up, forward].map((axis) => dot(way, axis));
-      return { x: 0.5 + Math.atan2(x, z) / (2 * Math.PI), y: Math.atan2(Math.hypot(x, z), y) / Math.PI, z: length(way) };
+      return {
+        x: 0.5 + Math.atan2(x, z) / (2 * Math.PI),
+        y: Math.atan2(Math.hypot(x, z), y) / Math.PI,
+        z: length(way),
+      };
     },
     direction(_, x, y, { right, up, forward }) {
       const [azimuth, polar] = [2 * Math.PI * (x - 0.5), Math.PI * y];

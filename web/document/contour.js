@@ -7,8 +7,22 @@ const LEVEL = 0.3; // of the blurred mask, whose edge it follows: a line of one 
 // Where the sides of a square of four neighbours are crossed, by which corners are inside: bits 1, 2, 4, 8 are the upper
 // left, the upper right, the lower right and the lower left one; sides 0 to 3 begin at the upper one, clockwise.
 const CROSSED = [
-  [], [3, 0], [0, 1], [3, 1], [1, 2], [3, 0, 1, 2], [0, 2], [3, 2],
-  [2, 3], [2, 0], [0, 1, 2, 3], [2, 1], [1, 3], [1, 0], [0, 3], [],
+  [],
+  [3, 0],
+  [0, 1],
+  [3, 1],
+  [1, 2],
+  [3, 0, 1, 2],
+  [0, 2],
+  [3, 2],
+  [2, 3],
+  [2, 0],
+  [0, 1, 2, 3],
+  [2, 1],
+  [1, 3],
+  [1, 0],
+  [0, 3],
+  [],
 ];
 
 // The window of the layer that has the shape with a border: {left, top, width, height, mask}; null where none is seen.
@@ -27,8 +41,7 @@ function cut({ floats, width, height }, shape) {
   const size = { width: right - left, height: bottom - top };
   const mask = new Float32Array(size.width * size.height);
   for (let j = ROUNDS; j < size.height - ROUNDS; j += 1)
-    for (let i = ROUNDS; i < size.width - ROUNDS; i += 1)
-      if (isIt(left + i, top + j)) mask[j * size.width + i] = 1;
+    for (let i = ROUNDS; i < size.width - ROUNDS; i += 1) if (isIt(left + i, top + j)) mask[j * size.width + i] = 1;
   return { left, top, ...size, mask };
 }
 
@@ -55,7 +68,12 @@ export function contour(layer, shape) {
       const places = sides.map((side) => {
         const [a, b] = [corners[side], corners[(side + 1) % 4]];
         const share = (LEVEL - a) / (b - a);
-        const [x, y] = [[share, 0], [1, share], [1 - share, 1], [0, 1 - share]][side];
+        const [x, y] = [
+          [share, 0],
+          [1, share],
+          [1 - share, 1],
+          [0, 1 - share],
+        ][side];
         return [left + i + x + 0.5, top + j + y + 0.5];
       });
       for (let k = 0; k < places.length; k += 2) lines.push([...places[k], ...places[k + 1]]);

@@ -230,7 +230,7 @@ export class Editor extends Store {
     const was = things.length ? undefined : chosen.material;
     const { arrival, lost, material, ...made } = dressed(this.state, things, what, was);
     this.#arrival = arrival;
-    const thing = things.find((each) => each === chosen.thing) ?? things[0] ?? selectedWith({ ...made, chosen }, material);
+    const thing = things.find((one) => one === chosen.thing) ?? things[0] ?? selectedWith({ ...made, chosen }, material);
     this.change({ ...made, chosen: { ...chosen, thing, material } });
     if (lost.length) this.complain(new Error(missingWords(lost)));
   }

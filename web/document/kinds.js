@@ -12,7 +12,11 @@ export const SHAPES = {
   cylinder: { title: "Cylinder", lamp: "Tube light", place: 3 },
   mesh: {},
 };
-export const LIGHTS = { point: { title: "Point light" }, spot: { title: "Spot light" }, directional: { title: "Sun" } };
+export const LIGHTS = {
+  point: { title: "Point light" },
+  spot: { title: "Spot light" },
+  directional: { title: "Sun" },
+};
 
 export const isFlat = ({ type }) => Boolean(SHAPES[type]?.isFlat);
 export const isLight = ({ type }) => Object.hasOwn(LIGHTS, type);

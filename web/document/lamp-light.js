@@ -20,8 +20,7 @@ const digits = (x) => Number(x.toPrecision(5));
 const bright = (rgb) => rgb.reduce((sum, x, i) => sum + LUMINANCE[i] * x, 0);
 
 // What holds its strength: the name of a light's own field.
-export const strengthName = ({ type }) =>
-  LIGHTS[type]?.strength ?? "emission";
+export const strengthName = ({ type }) => LIGHTS[type]?.strength ?? "emission";
 
 // Its strength as linear [r, g, b] in its unit.
 export const lightOf = (scene, document) =>

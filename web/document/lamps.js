@@ -29,7 +29,8 @@ const radians = (degrees) => (degrees * Math.PI) / 180;
 const rounded = (v) => v.map((x) => Number(x.toPrecision(4)) + 0);
 
 // How far along a ray from a point a wall is met, or Infinity.
-const wallAt = (shape, from, direction) => (KINDS[shape.type].isWall ? hit(shape, from, direction) : null) ?? Infinity;
+const wallAt = (shape, from, direction) =>
+  (KINDS[shape.type].isWall ? hit(shape, from, direction) : null) ?? Infinity;
 
 // What a new light is for: {center, radius, shapes}, the indices of its shapes: the selected thing, or where that is a lamp
 // or none, all things that are neither flat nor lamps; at last what the camera looks at.

@@ -37,7 +37,12 @@ export const LIGHTS = {
     isSharp: true,
   },
   directional: {
-    make: ({ direction, power }) => ({ type: "directional", direction, irradiance: power(1), angular_diameter: 0.53 }),
+    make: ({ direction, power }) => ({
+      type: "directional",
+      direction,
+      irradiance: power(1),
+      angular_diameter: 0.53,
+    }),
     strength: "irradiance",
     units: () => ({ lx: 1 }),
   },

@@ -59,7 +59,9 @@ export function mapped(thing, map, pivot) {
     };
   }
   const factors = isDiagonal(map) ? WORLD.map((axis, k) => map(axis)[k]) : null;
-  const own = thing.transform ? null : KINDS[thing.type].mapped?.(thing, { map, to, factor: similarity(map), factors });
+  const own = thing.transform
+    ? null
+    : KINDS[thing.type].mapped?.(thing, { map, to, factor: similarity(map), factors });
   if (own) return own;
   return { ...thing, transform: composed(thing.transform, map, pivot) };
 }

@@ -20,7 +20,9 @@ export const isShape = (thing) => thing.startsWith("/shapes/");
 // Some things are made of another material of the scene.
 export const wearing = (scene, things, name) => ({
   ...scene,
-  shapes: scene.shapes.map((shape, i) => (things.includes(pointer("shapes", i)) ? { ...shape, material: name } : shape)),
+  shapes: scene.shapes.map((shape, i) =>
+    things.includes(pointer("shapes", i)) ? { ...shape, material: name } : shape,
+  ),
 });
 
 // What is selected with a material: the thing that is chosen if it is made of that or if nothing is, else the first that

@@ -110,7 +110,12 @@ const quad = {
     );
   },
   moved: (shape, by) => ({ ...shape, origin: by(shape.origin) }),
-  mapped: (shape, { to, map }) => ({ ...shape, origin: to(shape.origin), u: tidy(map(shape.u)), v: tidy(map(shape.v)) }),
+  mapped: (shape, { to, map }) => ({
+    ...shape,
+    origin: to(shape.origin),
+    u: tidy(map(shape.u)),
+    v: tidy(map(shape.v)),
+  }),
   axes: ({ u, v }) => [u, v, cross(u, v)],
   rings: (shape) => [quadCorners(shape)],
   lamp: {
@@ -160,7 +165,8 @@ const disk = {
   },
 };
 
-const cylinderRims = ({ base, axis, radius }) => [base, add(base, axis)].map((center) => rimAbout(axis, center, radius));
+const cylinderRims = ({ base, axis, radius }) =>
+  [base, add(base, axis)].map((center) => rimAbout(axis, center, radius));
 
 const cylinder = {
   make: ([x, y, z], r, material) => ({

@@ -116,11 +116,10 @@ export function strengthControl(field, id, events) {
   const title = `${field.title}, strength`;
   const ends = { min: 2 ** -STOPS, max: 2 ** STOPS };
   const range = track(named(title, { soft: ends }), `${id}-strength`, events);
-  const stops = numberEntry(
-    { ...STOP, title },
-    `${id}-stops`,
-    { ...events, input: (value) => events.input(value === undefined ? undefined : exact(2 ** value)) },
-  );
+  const stops = numberEntry({ ...STOP, title }, `${id}-stops`, {
+    ...events,
+    input: (value) => events.input(value === undefined ? undefined : exact(2 ** value)),
+  });
   const entry = numberEntry(named(title, {}), `${id}-strength-entry`, events);
   range.element.setAttribute("aria-label", title);
   stops.element.setAttribute("aria-label", `${title} in stops`);

@@ -84,7 +84,10 @@ export function folds(rows, fields) {
         const first = changed.slice(0, MOST_WORDS);
         const now = JSON.stringify([changed.length, first.map(({ name }) => [name, values[name]])]);
         if (told.dataset.now !== now) {
-          const parts = first.flatMap((field, i) => [...(i ? [", "] : []), ...words(field, values[field.name], group)]);
+          const parts = first.flatMap((field, i) => [
+            ...(i ? [", "] : []),
+            ...words(field, values[field.name], group),
+          ]);
           told.replaceChildren(...parts, ...(changed.length > MOST_WORDS ? [", …"] : []));
           told.dataset.now = now;
         }

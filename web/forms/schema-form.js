@@ -15,7 +15,9 @@ import { describe } from "../lib/tooltip.js";
 import { unitText } from "../lib/format-text.js";
 
 const isSame = ({ widget }, a, b) =>
-  ["color", "amounts"].includes(widget) && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+  ["color", "amounts"].includes(widget) && a !== undefined && b !== undefined
+    ? equal(linear(a), linear(b))
+    : equal(a, b);
 
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 

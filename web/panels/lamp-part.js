@@ -34,7 +34,8 @@ const HINTS = {
   size: `Larger is softer. ${KEEPS}`,
   distance: "From the middle of what it shines at, along the line to there. Nearer is brighter, and softer.",
   softness: `Its size over its distance: 0.1 is hard, 1 very soft. It changes the size. ${KEEPS}`,
-  shared: "Other things shine with its material: its colour and power are theirs too, and it gets brighter as it grows.",
+  shared:
+    "Other things shine with its material: its colour and power are theirs too, and it gets brighter as it grows.",
 };
 const UNITS = { lm: "lm", cd: "cd", lx: "lx", nt: "cd/m²" };
 
@@ -157,10 +158,18 @@ export class LampPart {
     const { thing } = this;
     const rgb = lamp.lightOf(scene, at(scene, thing));
     if (name === "temperature")
-      return lamp.withLight(scene, thing, lamp.tinted(rgb, typeof value === "number" ? linear({ kelvin: value }) : value));
+      return lamp.withLight(
+        scene,
+        thing,
+        lamp.tinted(rgb, typeof value === "number" ? linear({ kelvin: value }) : value),
+      );
     if (name === "power") {
       const before = lamp.power(rgb);
-      return lamp.withLight(scene, thing, before > 0 ? rgb.map((x) => (x * (value ?? 0)) / before) : [value, value, value]);
+      return lamp.withLight(
+        scene,
+        thing,
+        before > 0 ? rgb.map((x) => (x * (value ?? 0)) / before) : [value, value, value],
+      );
     }
     if (name === "distance") return lamp.withDistance(scene, thing, stand, value);
     if (name === "softness") return lamp.withSoftness(scene, thing, stand, value);

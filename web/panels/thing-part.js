@@ -5,7 +5,14 @@ import { added } from "../document/materials.js";
 import { inWords } from "../lib/format-text.js";
 import { OnDemand } from "../lib/on-demand.js";
 import { at } from "../lib/patch.js";
-import { cameraModels, environmentModels, fields, lightModels, shapeModels, transformModel } from "../server/schema.js";
+import {
+  cameraModels,
+  environmentModels,
+  fields,
+  lightModels,
+  shapeModels,
+  transformModel,
+} from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
 import * as transforms from "../document/transforms.js";
 import { isSet } from "../document/emission.js";

@@ -18,7 +18,9 @@ const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebo
 const areInPlace = (shapes, before = []) =>
   shapes === before ||
   (shapes.length === before.length &&
-    shapes.every((shape, i) => shape === before[i] || equal({ ...shape, material: "" }, { ...before[i], material: "" })));
+    shapes.every(
+      (shape, i) => shape === before[i] || equal({ ...shape, material: "" }, { ...before[i], material: "" }),
+    ));
 
 export class Picks {
   #outlined = {}; // what the outline was drawn of: it stays while that is so

@@ -125,7 +125,9 @@ export function problemText(problem, titles = {}, place = (pointer) => placeWord
   if (problem instanceof Problem && (problem.isGeneric || problem.status === 429 || problem.status === 503)) {
     return (
       BY_STATUS[problem.status] ??
-      (problem.status >= 500 ? "Something went wrong on the server. Its log says more." : "The server does not take this.")
+      (problem.status >= 500
+        ? "Something went wrong on the server. Its log says more."
+        : "The server does not take this.")
     );
   }
   return ended(sentence(problem.message));

@@ -886,11 +886,10 @@ const named=(title,more)=>({...field,title,ranges:true,initial:undefined,...more
 const title = `${field.title}, strength`;
 const ends={min:2 ** -STOPS,max:2 ** STOPS};
 const range = track(named(title, { soft: ends }), `${id}-strength`, events);
-const stops=numberEntry(
-{...STOP,title},
-`${id}-stops`,
-{...events,input:(value)=>events.input(value===undefined ? undefined:exact(2 ** value))},
-);
+const stops = numberEntry({ ...STOP, title }, `${id}-stops`, {
+...events,
+input:(value)=>events.input(value===undefined ? undefined:exact(2 ** value)),
+});
 const entry = numberEntry(named(title, {}), `${id}-strength-entry`, events);
 range.element.setAttribute("aria-label",title);
 stops.element.setAttribute("aria-label", `${title} in stops`);
@@ -1145,7 +1144,10 @@ const changed=own.filter(({name})=>rows.get(name).isChanged());
 const first=changed.slice(0,MOST_WORDS);
 const now=JSON.stringify([changed.length,first.map(({name})=>[name,values[name]])]);
 if(told.dataset.now !==now){
-const parts=first.flatMap((field,i)=>[...(i ? [", "]:[]),...words(field,values[field.name],group)]);
+const parts=first.flatMap((field,i)=>[
+...(i ? [", "]:[]),
+...words(field,values[field.name],group),
+]);
 told.replaceChildren(...parts,...(changed.length>MOST_WORDS ? [", …"]:[]));
 told.dataset.now=now;
 }
@@ -1238,7 +1240,9 @@ const { endsOf } = lib_span;
 const { describe } = lib_tooltip;
 const { unitText } = lib_format_text;
 const isSame=({widget},a,b)=>
-["color","amounts"].includes(widget)&&a !==undefined&&b !==undefined ? equal(linear(a),linear(b)):equal(a,b);
+["color","amounts"].includes(widget)&&a !==undefined&&b !==undefined
+? equal(linear(a),linear(b))
+:equal(a,b);
 const isTexture=(value)=>isObject(value)&&value.texture !==undefined;
 function row(field,{change,commit,forgive,takeFile,pickFile,slot,beneath}){
 const id=freshId(field.name);
@@ -1499,7 +1503,8 @@ const KINDS={
 perspective:{
 ...flat,
 halfHeight: ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2),
-direction:(camera,x,y,frame,aspect)=>add(frame.forward,across(halfHeight(camera,1),x,y,frame,aspect)),
+direction:(camera,x,y,frame,aspect)=>
+add(frame.forward,across(halfHeight(camera,1),x,y,frame,aspect)),
 },
 orthographic:{
 ...flat,
@@ -1515,7 +1520,11 @@ isAround:true,
 halfHeight: (_, distance) => (distance * Math.PI) / 2,
 project(_,way,{right,up,forward}){
 const [x,y,z]=[right,up,forward].map((axis)=>dot(way,axis));
-return { x: 0.5 + Math.atan2(x, z) / (2 * Math.PI), y: Math.atan2(Math.hypot(x, z), y) / Math.PI, z: length(way) };
+return{
+x: 0.5 + Math.atan2(x, z) / (2 * Math.PI),
+y: Math.atan2(Math.hypot(x, z), y) / Math.PI,
+z:length(way),
+};
 },
 direction(_,x,y,{right,up,forward}){
 const [azimuth,polar]=[2 * Math.PI *(x - 0.5),Math.PI * y];
