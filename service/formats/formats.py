@@ -12,8 +12,8 @@ from service.formats.types import Kind
 
 COMPRESSIONS = ("draco", "meshopt", "ktx2")  # of meshes and images inside glTF files
 
-MODELS = ("fbx", "dae", "3ds", "x3d", "3mf")  # that Assimp reads
-FOREIGN = (*MODELS, "step")  # that a library turns into glTF
+MODELS = ("fbx", "dae", "3ds", "x3d")  # that Assimp reads
+FOREIGN = (*MODELS, "3mf", "step")  # that are turned into glTF
 
 # What installs the package that a format needs, and the module by which it is known to be there.
 PACKAGES: dict[str, tuple[str, str]] = {
@@ -34,8 +34,7 @@ KINDS: dict[str, Kind] = {
     "zip": "scene",  # or "materials", by what is in it
     "mtlx": "materials",
     "usd": "scene",
-    **dict.fromkeys(MODELS, "scene"),
-    "step": "scene",
+    **dict.fromkeys(FOREIGN, "scene"),
     "exr": "image",
     "hdr": "image",
     "png": "image",

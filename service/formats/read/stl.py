@@ -11,7 +11,7 @@ import numpy.typing as npt
 from service.colorimetry import decode_srgb
 from service.formats.errors import ParseError
 from service.formats.formats import STL_TEXT, text
-from service.formats.read.bad_elements import left_out
+from service.formats.read.bad_elements import are_places, left_out
 from service.formats.read.numbers import parsed
 from service.formats.read.raw_mesh import Numbers, RawMesh
 from service.formats.types import AssetLimits, Floats
@@ -24,7 +24,7 @@ TEXT_FACET = re.compile(
     rb"\bfacet\b" + NORMAL + rb"\bouter\s++loop\s++" + 3 * VERTEX + rb"end ?loop\b", re.IGNORECASE
 )
 BEGUN = re.compile(rb"^[^\S\n]*+facet\b", re.IGNORECASE | re.MULTILINE)
-ENDED = re.compile(rb"^[^\S\n]*+endsolid\b[^\n]*+", re.IGNORECASE | re.MULTILINE)
+ENDED = re.compile(rb"\bendsolid\b[^\n]*+", re.IGNORECASE)
 UNKNOWN = (0, 2**32 - 1)  # what a program writes for the number of facets that it doesn't know yet
 # Of a facet's 16 bits, Magics and VisCAM take five for each channel, in opposite orders, and one to say whose colour
 # it is. Magics has the whole body's colour in the header.
@@ -63,14 +63,28 @@ def _read_binary(view: memoryview, told: list[str]) -> tuple[Numbers, Floats | N
     if count in UNKNOWN and there and not rest:
         told.append(f"the header promises {count} triangles; all {there} that follow it are read")
         count, promised = there, len(view)
+    elif len(view) < promised and _holds_facets(view, there):
+        told.append(f"the file is cut off: of {count} triangles that its header promises, {there} are whole and read")
+        count, promised = there, len(view)
     elif len(view) < promised or not count:
-        raise ParseError(f"not an STL file: {len(view)} bytes; its header promises {promised}, and it is no text")
+        raise ParseError(
+            f"not an STL file: {len(view)} bytes; its header promises {promised}, and it is no text of solids"
+        )
     if len(view) > promised:
         told.append(
             f"{_bytes(len(view) - promised)} after the {count} triangles that the header promises are not read"
         )
     rows = np.frombuffer(view, FACET, count, HEADER_BYTES)
     return rows["vertices"].reshape(-1, 3), _colors(bytes(view[:80]), rows["attributes"], told)
+
+
+def _holds_facets(view: memoryview, count: int) -> bool:
+    """True if whole facets follow the header, where their number in it is wrong: a file of another kind is no text
+    with zero bytes, and most of its nines of numbers are out of range."""
+    if not count or b"\0" not in bytes(view[HEADER_BYTES : HEADER_BYTES + FACET.itemsize * count]):
+        return False
+    vertices = np.frombuffer(view, FACET, count, HEADER_BYTES)["vertices"].reshape(-1, 9)
+    return bool(np.count_nonzero(are_places(vertices)) * 2 > count)
 
 
 def _bytes(count: int) -> str:
@@ -106,12 +120,11 @@ def _colors(header: bytes, attributes: npt.NDArray[np.uint16], told: list[str]) 
 def _read_text(data: bytes, told: list[str]) -> Numbers:
     """Three rows for each facet of all solids that has three vertices."""
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    end = next(reversed([*ENDED.finditer(data)]), None)
     begun = [match.start() for match in BEGUN.finditer(data)]
-    if end is None or begun[-1:] > [end.start()]:
-        raise ParseError("the file is cut off: it does not end with `endsolid`")
-    junk = data[end.end() :].strip(b"\0\x1a \n\t\v\f")
-    if junk:
+    end = next(reversed([*ENDED.finditer(data, begun[-1] if begun else 0)]), None)
+    if end is None:
+        told.append("the file is cut off: it does not end with `endsolid`")
+    elif junk := data[end.end() :].strip(b"\0\x1a \n\t\v\f"):
         told.append(f"{_bytes(len(junk))} after the last `endsolid` are not read: {_shown(junk)}")
     found = [(match.start(), match.groups()) for match in TEXT_FACET.finditer(data)]
     words = b" ".join(chain.from_iterable(groups for _, groups in found))
@@ -122,6 +135,7 @@ def _read_text(data: bytes, told: list[str]) -> Numbers:
         line = data.count(b"\n", 0, lines[0]) + 1 if lines else 1
         reason = f"the facet of line {line} does not have three vertices"
         if not found:
+            reason = "; ".join([*told, reason])
             raise ParseError(reason if len(begun) == 1 else f"none of its {len(begun)} facets can be read; {reason}")
         told.append(left_out(len(begun) - len(found), "facet", reason))
     return vertices

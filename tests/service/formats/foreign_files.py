@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -147,13 +148,17 @@ def x3d() -> bytes:
 def package_3mf(unit: str | None = None) -> bytes:
     """A tetrahedron of 10 units along x and y, 20 along z, red in sRGB."""
     attribute = "" if unit is None else f' unit="{unit}"'
-    model = f"""<?xml version="1.0" encoding="UTF-8"?>
+    return three_mf(f"""<?xml version="1.0" encoding="UTF-8"?>
 <model{attribute} xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
 <basematerials id="2"><base name="Red" displaycolor="#BC0000FF"/></basematerials>
 <object id="1" type="model" pid="2" pindex="0"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="10" y="0" z="0"/>
 <vertex x="0" y="10" z="0"/><vertex x="0" y="0" z="20"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/>
 <triangle v1="0" v2="1" v3="3"/><triangle v1="1" v2="2" v3="3"/><triangle v1="2" v2="0" v3="3"/></triangles></mesh>
-</object></resources><build><item objectid="1"/></build></model>"""
+</object></resources><build><item objectid="1"/></build></model>""")
+
+
+def three_mf(model: str, parts: Mapping[str, str | bytes] | None = None) -> bytes:
+    """A package of a model, and other parts by their names."""
     types = (
         '<?xml version="1.0" encoding="UTF-8"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
         '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
@@ -167,8 +172,9 @@ def package_3mf(unit: str | None = None) -> bytes:
     )
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as package:
-        for name, text in (("[Content_Types].xml", types), ("_rels/.rels", relations), ("3D/3dmodel.model", model)):
-            package.writestr(name, text)
+        fixed = {"[Content_Types].xml": types, "_rels/.rels": relations, "3D/3dmodel.model": model}
+        for name, content in (fixed | dict(parts or {})).items():
+            package.writestr(name, content)
     return file.getvalue()
 
 

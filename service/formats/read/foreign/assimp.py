@@ -1,17 +1,14 @@
-"""FBX, COLLADA, 3DS, X3D and 3MF as a GLB, by Assimp.
+"""FBX, COLLADA, 3DS and X3D as a GLB, by Assimp.
 
 Assimp's reader and its writer of glTF do the work; here stands what the writer leaves out or has otherwise: cameras
-and lights, the units of 3MF, images in other files, numbers that glTF does not allow. Runs in the parsing child, that
+and lights, images in other files, numbers that glTF does not allow. Runs in the parsing child, that
 ends afterwards: to free what some files have become ends in a crash [Assimp 6.0.5, `aiReleaseImport` of COLLADA].
 """
 
 from __future__ import annotations
 
 import ctypes
-import io
 import math
-import re
-import zipfile
 from functools import cache
 from typing import Any
 
@@ -30,12 +27,6 @@ KEEP_PIVOTS = b"IMPORT_FBX_PRESERVE_PIVOTS"  # 0: a node's transform is one matr
 
 DIRECTIONAL, POINT, SPOT = 1, 2, 3  # of aiLightSourceType
 LIGHTS = "KHR_lights_punctual"
-
-# Metres of 3MF's units [3MF core specification 1.3, 3.4]; its z is up, and glTF's y.
-METRES = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
-MODEL_PART = re.compile(r"(^|/)3d/[^/]*\.model$", re.IGNORECASE)
-UNIT = re.compile(rb"<(?:\w+:)?model\b[^>]*\bunit\s*=\s*[\"']\s*(\w+)")
-HEAD = 65_536  # bytes of a model part in which its root stands
 
 Matrix = npt.NDArray[np.float64]
 _Pointer = ctypes.c_void_p
@@ -110,7 +101,7 @@ class _Blob(ctypes.Structure):
 def _library() -> ctypes.CDLL:
     path = assimp()
     if path is None:
-        raise MissingExtra("FBX, COLLADA, 3DS, X3D and 3MF files need sunbox-server[models] on the server")
+        raise MissingExtra("FBX, COLLADA, 3DS and X3D files need sunbox-server[models] on the server")
     library = ctypes.CDLL(path)
     library.aiCreatePropertyStore.restype = _Pointer
     library.aiSetImportPropertyInteger.argtypes = [_Pointer, ctypes.c_char_p, ctypes.c_int]
@@ -146,12 +137,10 @@ def converted(format: str, data: bytes, find: Find) -> Glb:
     file = Glb.read(ctypes.string_at(blob.contents.data, blob.contents.size))
     file.drop_extension("FB_ngon_encoding")
     file.mend_accessors()
-    if format == "3mf":
-        file.turn_z_up("3MF", _metres(data))
     _lights(file, scene.contents, is_collada=format == "dae")
     _cameras(file, scene.contents)
     for material in file.root.get("materials", []):
-        _material(material, file, is_srgb=format == "3mf")
+        _material(material, file)
     file.embed(lambda name: find(_first(name)))
     for values in (material.get("pbrMetallicRoughness", {}) for material in file.root.get("materials", [])):
         if "baseColorTexture" in values:  # in these formats it stands in the place of the colour
@@ -169,21 +158,7 @@ def _first(name: str) -> str:
     return next((part for part in name.split('"') if part.strip()), name)
 
 
-def _metres(data: bytes) -> float:
-    """The unit of a 3MF package, in metres: a millimetre where it says none."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as package:
-            part = next((name for name in package.namelist() if MODEL_PART.search(name)), None)
-            if part is None:
-                return METRES["millimeter"]
-            with package.open(part) as file:
-                found = UNIT.search(file.read(HEAD))
-    except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError):
-        return METRES["millimeter"]
-    return METRES.get("millimeter" if found is None else found[1].decode("ascii", "replace"), METRES["millimeter"])
-
-
-def _material(material: dict[str, Any], file: Glb, is_srgb: bool) -> None:
+def _material(material: dict[str, Any], file: Glb) -> None:
     """Numbers that glTF does not allow, and those by which exporters say that they have none."""
     extensions: dict[str, Any] = material.setdefault("extensions", {})
     if extensions.get("KHR_materials_ior", {}).get("ior", 1.5) <= 1.0:  # COLLADA's exporters write 1 for "none"
@@ -201,20 +176,12 @@ def _material(material: dict[str, Any], file: Glb, is_srgb: bool) -> None:
             file.warnings.append(f"the material {material.get('name', '')!r}: {detail}")
             values[name] = min(max(values[name], 0.0), 1.0) if values[name] == values[name] else 0.5
     color = values.get("baseColorFactor")
-    if color is not None:
-        if color[3] == 0.0:  # exporters that write transparency for opacity
-            name = material.get("name", "")
-            file.warnings.append(f"the material {name!r} is wholly transparent; it is shown as opaque")
-            color[3] = 1.0
-        if is_srgb:
-            color[:3] = [_linear(each) for each in color[:3]]
+    if color is not None and color[3] == 0.0:  # exporters that write transparency for opacity
+        name = material.get("name", "")
+        file.warnings.append(f"the material {name!r} is wholly transparent; it is shown as opaque")
+        color[3] = 1.0
     if not extensions:
         del material["extensions"]
-
-
-def _linear(value: float) -> float:
-    """Of a number from 0 to 1 in sRGB [IEC 61966-2-1]."""
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
 
 
 def _cameras(file: Glb, scene: _Scene) -> None:

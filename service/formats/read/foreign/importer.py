@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from service.formats.read.archive import Archive
-from service.formats.read.foreign import assimp, cad
+from service.formats.read.foreign import assimp, cad, three_mf
 from service.formats.read.foreign.glb import Find, Glb
 from service.formats.read.gltf.importer import read_scene
 from service.formats.read.gltf.merged_mesh import read_merged
@@ -18,7 +18,7 @@ def read_foreign_scene(
 ) -> SceneFile:
     """The scene. `find` gives the files beside it, by the names that it has for them. Raises ParseError,
     MissingExtra."""
-    file = _converted(format, data, find)
+    file = _converted(format, data, limits, find)
     found = read_scene(file.written(), limits, pose)
     notes = [{"pointer": "", "detail": detail} for detail in dict.fromkeys(file.warnings)]
     return replace(found, warnings=[*notes, *found.warnings])
@@ -44,8 +44,10 @@ def read_zipped_foreign(
 
 def read_foreign_mesh(format: str, data: memoryview, limits: AssetLimits) -> RawMesh:
     """All its triangles as one mesh. Raises ParseError, MissingExtra."""
-    return read_merged(_converted(format, data, lambda name: None).written(), limits)
+    return read_merged(_converted(format, data, limits, lambda name: None).written(), limits)
 
 
-def _converted(format: str, data: memoryview, find: Find) -> Glb:
+def _converted(format: str, data: memoryview, limits: AssetLimits, find: Find) -> Glb:
+    if format == "3mf":
+        return three_mf.converted(bytes(data), limits)
     return cad.converted(bytes(data)) if format == "step" else assimp.converted(format, bytes(data), find)

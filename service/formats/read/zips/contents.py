@@ -11,7 +11,7 @@ from service.formats.formats import KINDS, MAGIC, OTHER_MODELS, SUFFIXES, UNREAD
 from service.formats.read.archive import Archive, listed
 from service.formats.read.references import Finder
 
-MODELS = ("gltf", "glb", "obj", "ply", "stl", "usd", *formats.MODELS)
+MODELS = ("gltf", "glb", "obj", "ply", "stl", "usd", *formats.MODELS, "3mf")
 MOST_NAMED = 20  # models in a message
 MOST_CHOICES = 500  # models to choose from
 PACKAGE, ZIP, MATERIALX = ".usdz", ".zip", "mtlx"

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from types import ModuleType
 
 from service.formats.errors import MissingExtra, ParseError
-from service.formats.formats import MODELS, PACKAGES, text
+from service.formats.formats import FOREIGN, PACKAGES, text
 from service.formats.read.archive import Archive, listed, zipped
 from service.formats.read.gltf.importer import read_zipped_scene
 from service.formats.read.gltf.merged_mesh import read_zipped_merged
@@ -51,7 +51,7 @@ def read_zip_as_mesh(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
         return usd.read_zipped_merged(archive, path, limits)  # type: ignore[no-any-return]
     if format in ("gltf", "glb"):
         return read_zipped_merged(archive, path, limits)
-    if format in MODELS:
+    if format in FOREIGN:
         from service.formats.read.foreign.importer import read_foreign_mesh
 
         return read_foreign_mesh(format, memoryview(archive.read(path)), limits)
@@ -129,7 +129,7 @@ def _model(archive: Archive, path: str, format: str, limits: AssetLimits, pose: 
         if _is_package(path):
             return usd.read_scene(archive.read(path), limits)  # type: ignore[no-any-return]
         return usd.read_zipped_scene(archive, path, limits)  # type: ignore[no-any-return]
-    if format in MODELS:
+    if format in FOREIGN:
         from service.formats.read.foreign.importer import read_zipped_foreign
 
         return read_zipped_foreign(archive, path, format, limits, pose)
