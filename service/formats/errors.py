@@ -21,6 +21,10 @@ class MissingExtra(ParseError):
     """A file was refused because the package that reads it is not installed; the message names the extra."""
 
 
+class NoTriangles(ParseError):
+    """A scene was refused because none of its nodes has a mesh."""
+
+
 def at_fault(place: str, asset: str) -> str:
     """The pointer to the field at fault, given the place that a refusal names in a file and the pointer to the asset:
     this, or the one to the `layer` beside it."""

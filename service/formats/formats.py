@@ -117,6 +117,9 @@ UNREADABLE = (
 OTHER_MODELS = (
     ".3dm", ".abc", ".blend", ".c4d", ".iges", ".igs", ".lwo", ".ma", ".max", ".mb", ".skp", ".sldprt",
 )  # fmt: skip
+OTHER_IMAGES = (
+    ".avif", ".bmp", ".dds", ".gif", ".heic", ".jp2", ".jxl", ".ktx2", ".psd", ".svg", ".tga", ".tif", ".tiff",
+)  # fmt: skip
 UNREAD = "a model in a format that is not read; export it as glTF (.glb)"
 
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.

@@ -22,6 +22,7 @@ MOST_RATIO, SLACK = 32, 16 << 20
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 ENCRYPTED = 0x1
 UTF_8 = 0x800  # the flag of an entry whose name is in UTF-8
+UNICODE_NAME = 0x7075  # the kind of fact about an entry that is its name in UTF-8
 # What programs that show folders leave in them; in lower case, as some of their file systems know no case.
 UNUSED_FOLDER = "__macosx"
 UNUSED_FILES = (".ds_store", "thumbs.db", "desktop.ini")
@@ -48,9 +49,11 @@ class Archive:
         for entry in entries:
             _check(entry)
             name, other = (posixpath.normpath(each) for each in _names(entry))
-            if entry.is_dir() or _is_unused(name):
+            if _slashed(entry.filename).endswith("/") or _is_unused(name):
                 continue
-            if name in self._files:
+            if (same := self._files.get(name)) is not None:
+                if (same.CRC, same.file_size) == (entry.CRC, entry.file_size):
+                    continue
                 raise ParseError(f"the zip has two files named {name[:100]!r}")
             self._files[name] = entry
             others[other] = name
@@ -128,15 +131,34 @@ def zipped(files: Mapping[str, bytes]) -> bytes:
 def _names(entry: zipfile.ZipInfo) -> tuple[str, str]:
     """The name of an entry, and what it is called where its bytes are read as another program may have written them.
 
-    Many write UTF-8 without its flag, or the code page of their system; zips know only that of the first PCs.
+    Many write UTF-8 without its flag, or the code page of their system; zips know only that of the first PCs. Some on
+    Windows write its backslashes, and some write the name once more, in UTF-8, among the further facts.
     """
+    name = _slashed(entry.filename)
     if entry.flag_bits & UTF_8:
-        return entry.filename, entry.filename
-    data = entry.filename.encode("cp437")
+        return name, name
+    if (further := _unicode_name(entry)) is not None:
+        return further, further
+    data = name.encode("cp437")
     try:
         return data.decode(), data.decode()
     except UnicodeDecodeError:
-        return entry.filename, decoded(data)
+        return name, decoded(data)
+
+
+def _slashed(name: str) -> str:
+    return name.replace("\\", "/")
+
+
+def _unicode_name(entry: zipfile.ZipInfo) -> str | None:
+    """The name in UTF-8 of an entry's further facts [PKWARE, APPNOTE 4.6.9], unless it belongs to another name."""
+    facts, checksum = entry.extra, struct.pack("<I", zlib.crc32(entry.orig_filename.encode("cp437")))
+    while len(facts) >= 4:
+        kind, size = struct.unpack_from("<HH", facts)
+        fact, facts = facts[4 : 4 + size], facts[4 + size :]
+        if kind == UNICODE_NAME and fact[1:5] == checksum:
+            return _slashed(fact[5:].decode("utf-8", "replace"))
+    return None
 
 
 def _is_unused(name: str) -> bool:
@@ -146,12 +168,12 @@ def _is_unused(name: str) -> bool:
 
 def _check(entry: zipfile.ZipInfo) -> None:
     """Raise ParseError for an entry that could lead out of a folder, or that cannot simply be inflated."""
-    name = entry.orig_filename
-    shown = repr(name[:100])
-    if "\0" in name or "\\" in name:
-        raise ParseError(f"the zip's entry {shown} has a character in its name that no path has")
-    if name.startswith("/") or DRIVE.match(name) or ".." in name.split("/"):
-        raise ParseError(f"the zip's entry {shown} leads out of its folder")
+    shown = repr(entry.orig_filename[:100])
+    for name in (_slashed(entry.orig_filename), *_names(entry)):
+        if "\0" in name:
+            raise ParseError(f"the zip's entry {shown} has a character in its name that no path has")
+        if name.startswith("/") or DRIVE.match(name) or ".." in name.split("/"):
+            raise ParseError(f"the zip's entry {shown} leads out of its folder")
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         raise ParseError(f"the zip's entry {shown} is {'a link' if kind == stat.S_IFLNK else 'no ordinary file'}")

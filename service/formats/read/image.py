@@ -1,6 +1,5 @@
 """Image files -> texels, bytes or float32. Runs in the parsing child."""
 
-import io
 import os
 import re
 import struct
@@ -17,6 +16,7 @@ from service.formats.read.exr_cube import FORMAT as CUBE
 from service.formats.read.exr_cube import TOLD, latitude_longitude
 from service.formats.read.exr_layers import check_sampling, choose
 from service.formats.read.hdr_lines import is_new, read_lines
+from service.formats.read.png_chunks import END, opened, readable, remarks
 from service.formats.types import AssetLimits, Floats, ImageData
 
 PILLOW = {"png": "PNG", "jpeg": "JPEG", "webp": "WEBP"}
@@ -31,7 +31,6 @@ SIGNATURES: dict[str, tuple[bytes, ...]] = {
 HDR_LINE = re.compile(rb"(?m)^(EXPOSURE|COLORCORR|PRIMARIES)[ \t]*=(.*)$")
 NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue and white
-PNG_END = b"IEND\xaeB`\x82"
 HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # of Rec.709's primaries
 ORIENTATION = 0x0112  # the EXIF tag
@@ -54,7 +53,8 @@ def parse_image(format: str, data: bytes, limits: AssetLimits, layer: str = "") 
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
         raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
-    told = (*_header(format, data), *read.warnings)
+    said = _unfollowed(_open(format, data, limits), data) if format in PILLOW else _header(format, data)
+    told = (*said, *read.warnings)
     return ImageData(np.ascontiguousarray(pixels, np.float32), told, read.layers)
 
 
@@ -83,18 +83,23 @@ def check_size(width: int, height: int, limits: AssetLimits) -> None:
         raise ParseError(f"{width} x {height} texels; 1 to {limits.max_texels} are allowed")
 
 
-def _pillow(format: str, data: bytes, limits: AssetLimits) -> tuple[npt.NDArray[np.uint8], list[str]]:
-    from PIL import Image, UnidentifiedImageError
+def _open(format: str, data: bytes, limits: AssetLimits) -> Any:
+    """An image of which only the header was decoded. Raises ParseError."""
+    from PIL import UnidentifiedImageError
 
-    Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
     try:
-        image = Image.open(io.BytesIO(data), formats=[PILLOW[format]])
+        image = opened(data, [PILLOW[format]])
     except UnidentifiedImageError:
         raise ParseError(f"it begins as {format.upper()} does, but can't be read") from None
     check_size(*image.size, limits)
-    if format == "png" and PNG_END not in data:
+    return image
+
+
+def _pillow(format: str, data: bytes, limits: AssetLimits) -> tuple[npt.NDArray[np.uint8], list[str]]:
+    image = _open(format, data, limits)
+    if format == "png" and END not in data:
         raise ParseError("the file is cut off: it has no IEND chunk")
-    warnings = list(_unfollowed(image))
+    warnings = list(_unfollowed(image, data))
     image.load()
     grey = image.mode in ("1", "L")
     transparent = image.mode in ("LA", "PA", "La", "RGBa", "RGBA") or "transparency" in image.info
@@ -102,11 +107,13 @@ def _pillow(format: str, data: bytes, limits: AssetLimits) -> tuple[npt.NDArray[
     return np.asarray(converted).reshape(converted.height, converted.width, -1), warnings
 
 
-def _unfollowed(image: Any) -> Iterator[str]:
+def _unfollowed(image: Any, data: bytes) -> Iterator[str]:
     """Warnings about metadata that are not followed: row 0 is always v = 1, and the texture says whether it is
     sRGB."""
     frames = getattr(image, "n_frames", 1)
-    if frames > 1:
+    if image.format == "MPO":  # of phones: a picture with its depth, its other eye or a map of its highlights
+        yield f"it holds {frames} pictures: the first one is shown"
+    elif frames > 1:
         yield f"it moves: the first of its {frames} frames is shown"
     turned = image.getexif().get(ORIENTATION, 1)
     if turned in range(2, 9):
@@ -116,6 +123,8 @@ def _unfollowed(image: Any) -> Iterator[str]:
         yield "its colour profile is not sRGB, and is not followed"
     elif not profile and "srgb" not in image.info and abs(image.info.get("gamma", SRGB_GAMMA) - SRGB_GAMMA) > 0.01:
         yield f"its gamma ({image.info['gamma']:g}) is not followed: set the texture's color_space"
+    if image.format == "PNG":
+        yield from remarks(data)
 
 
 def _floats(format: str, data: bytes, limits: AssetLimits, layer: str) -> ImageData:
@@ -123,7 +132,7 @@ def _floats(format: str, data: bytes, limits: AssetLimits, layer: str) -> ImageD
     _check_header(format, data, limits)
     if format == "hdr" and (old := _old_lines(data)) is not None:
         return ImageData(_upright(old, data))
-    with _path(data) as path, _opened(format, path) as file:
+    with _path(readable(data)) as path, _opened(format, path) as file:
         choice = choose(file, layer)
         spec = file.spec()
         _check_plain(spec)

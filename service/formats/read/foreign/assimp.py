@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.formats.errors import MissingExtra, ParseError
+from service.formats.errors import MissingExtra, NoTriangles, ParseError
 from service.formats.formats import assimp
 from service.formats.read.foreign.glb import Find, Glb
 
@@ -130,7 +130,7 @@ def converted(format: str, data: bytes, find: Find) -> Glb:
     if not scene:
         raise ParseError(f"it can't be read: {_reason(library)}")
     if not scene.contents.mesh_count:
-        raise ParseError("the scene has no triangles: none of its nodes has a mesh that can be read")
+        raise NoTriangles("the scene has no triangles: none of its nodes has a mesh that can be read")
     blob = library.aiExportSceneToBlob(scene, b"glb2", 0)
     if not blob:
         raise ParseError(f"it can't be read: {_reason(library)}")

@@ -10,20 +10,19 @@ import numpy as np
 from service.formats.errors import ParseError
 from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.textures import Textures
+from service.formats.read.png_chunks import opened
 
 
 def pixels(textures: Textures, info: JsonView | None) -> Any:
     """The RGBA pixels of a texture's image; None where it has no image."""
-    from PIL import Image
 
     from service.formats.read.image import check_size
 
     source = textures.source(textures.file.follow(info, "index", "textures")) if info else None
     if source is None:
         return None
-    Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
     try:
-        image = Image.open(io.BytesIO(textures.data(source)), formats=["PNG", "JPEG", "WEBP"])
+        image = opened(textures.data(source), ["PNG", "JPEG", "WEBP"])
         check_size(*image.size, textures.file.limits)
         return image.convert("RGBA")
     except (OSError, SyntaxError, ValueError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from service.formats.read.gltf import ktx2_images
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.json_view import JsonView, number
 from service.formats.read.gltf.primitives import UV_SETS
+from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.scenes.wrapping import wrap_of
@@ -170,11 +170,9 @@ class Textures:
 
 def _channels(data: bytes, place: JsonView) -> str:
     """The channels of an image, from its header."""
-    from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # opening decodes nothing
     try:
-        image = Image.open(io.BytesIO(data), formats=[name.upper() for name in READ])
+        image = opened(data, [name.upper() for name in READ])
     except (OSError, SyntaxError, ValueError):
         raise ParseError("is a broken image", place.pointer) from None
     transparent = "A" in image.getbands() or "transparency" in image.info

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +12,7 @@ from service.formats.formats import KINDS, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
 from service.formats.read.obj.mtl import Map
+from service.formats.read.png_chunks import opened
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -138,10 +138,8 @@ class Textures:
 
 def _opened(data: bytes, found: Map) -> Any:
     """An image whose header was read, and nothing else of it."""
-    from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # `check_size` bounds the size
     try:
-        return Image.open(io.BytesIO(data), formats=list(PILLOW.values()))
+        return opened(data, list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):
         raise ParseError("is a broken image", found.place) from None

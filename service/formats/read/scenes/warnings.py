@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.formats.errors import ParseError
+from service.formats.errors import NoTriangles, ParseError
 
 MOST = 200  # different warnings, as an untrusted file may cause any number
 LONGEST = 300  # characters of a pointer or a detail
@@ -55,7 +55,7 @@ class Warnings:
         """The refusal of a file that has nothing to show, with the reasons."""
         found = [note for note in self.document() if note["detail"].startswith(tuple(self._omissions))]
         if not self._omissions or not found:
-            return ParseError("the scene has no triangles: none of its nodes has a mesh")
+            return NoTriangles("the scene has no triangles: none of its nodes has a mesh")
         reasons = "; ".join(note["detail"] for note in found[:3])
         return ParseError(f"the scene has no triangles: {reasons}", found[0]["pointer"])
 

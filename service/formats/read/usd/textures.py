@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import posixpath
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,7 @@ from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.images import encode
 from service.formats.read.image import parse_image
+from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
@@ -184,15 +184,13 @@ def _space(picture: Picture, data: bytes, bands: str) -> str:
 
 def _bands(data: bytes, pointer: str) -> str:
     """The channels of an image as Pillow names them; RGB for formats of floats."""
-    from PIL import Image
 
     format = sniff(data)
     if format not in PILLOW:
         return "RGB"
-    Image.MAX_IMAGE_PIXELS = None  # nothing is decoded here
     try:
-        opened = Image.open(io.BytesIO(data), formats=[PILLOW[format]])
+        image = opened(data, [PILLOW[format]])
     except (OSError, SyntaxError, ValueError):
         raise ParseError("is a broken image", pointer) from None
-    bands = "".join(opened.getbands())
-    return bands + "A" if "transparency" in opened.info and "A" not in bands else bands
+    bands = "".join(image.getbands())
+    return bands + "A" if "transparency" in image.info and "A" not in bands else bands

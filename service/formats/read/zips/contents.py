@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from service.formats import formats
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, MAGIC, OTHER_MODELS, SUFFIXES, UNREAD, USD_LAYERS
+from service.formats.formats import KINDS, MAGIC, OTHER_IMAGES, OTHER_MODELS, SUFFIXES, UNREAD, USD_LAYERS
 from service.formats.read.archive import Archive, listed
+from service.formats.read.obj.textures import FORMATS
 from service.formats.read.references import Finder
 
 MODELS = ("gltf", "glb", "obj", "ply", "stl", "usd", *formats.MODELS, "3mf")
@@ -79,9 +80,13 @@ def nothing(archive: Archive, found: Contents) -> str:
         how = "a zip within a zip is not opened: unpack it, and upload what it holds"
         return f"the zip holds {listed(found.zips)}; {how}"
     kinds = {KINDS[format] for format in map(_suffix_format, archive.names) if format}
-    images = ", and no images whose names say what they are, such as wood_color.png and wood_normal.png"
+    named = "and no images whose names say what they are, such as wood_color.png and wood_normal.png"
+    images = f", {named}; an image that is used by itself is uploaded without a zip"
     others = [name for name in archive.names if name.lower().endswith(OTHER_MODELS)]
+    pictures = [name for name in archive.names if name.lower().endswith(OTHER_IMAGES)]
     unread = f"; {listed(others[:1])} is {UNREAD}" if others else ""
+    if pictures:
+        unread += f"; {listed(pictures[:1])} is an image in a format that is not read ({FORMATS} are)"
     if any(name.lower().endswith(STEP) for name in archive.names):
         unread = "; a STEP file is read by itself: upload it without the zip"
     what = f"no model ({READ}){images if 'image' in kinds else ''}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from types import ModuleType
 
-from service.formats.errors import MissingExtra, ParseError
+from service.formats.errors import MissingExtra, NoTriangles, ParseError
 from service.formats.formats import FOREIGN, PACKAGES, text
 from service.formats.read.archive import Archive, listed, zipped
 from service.formats.read.gltf.importer import read_zipped_scene
@@ -31,7 +31,13 @@ def read_zip(
     names. Files that are not taken are told. Raises ParseError."""
     archive = Archive(data, limits.max_file)
     found = _contents(archive)
-    return _read(archive, found, chosen(found, entry), limits, pose)
+    path = chosen(found, entry)
+    try:
+        return _read(archive, found, path, limits, pose)
+    except NoTriangles:
+        if entry is not None or path is None:
+            raise
+        return _beside(archive, found, path, limits)
 
 
 def read_zip_as_mesh(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
@@ -117,6 +123,19 @@ def _read(archive: Archive, found: Contents, path: str | None, limits: AssetLimi
     assert path is not None
     scene = _model(archive, path, format, limits, pose)
     return _told(scene, archive, found, path)
+
+
+def _beside(archive: Archive, found: Contents, path: str, limits: AssetLimits) -> SceneFile:
+    """The materials beside a model without a mesh, as libraries of materials have it. Raises ParseError: NoTriangles
+    where there are none."""
+    del found.models[path]
+    archive.used.clear()
+    try:
+        return _read(archive, found, None, limits, None)
+    except MissingExtra:
+        raise
+    except ParseError:
+        raise NoTriangles("the scene has no triangles: none of its nodes has a mesh", path[:100]) from None
 
 
 def _model(archive: Archive, path: str, format: str, limits: AssetLimits, pose: Pose | None) -> SceneFile:

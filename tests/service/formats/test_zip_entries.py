@@ -1,0 +1,94 @@
+"""How the entries of a zip are written, and models without a mesh beside materials."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+
+from service.problems import AssetError
+from service.server.assets import AssetStore
+from tests import asset_files as make
+from tests.gltf_files import Gltf
+from tests.mtlx_files import mtlx, surface, value
+from tests.obj_files import TEXTURED, zipped
+
+OAK = make.png(np.full((2, 2, 3), (200, 100, 50), np.uint8))
+MTLX = mtlx(surface("gltf_pbr", value("base_color", "1, 0.5, 0", "color3")))
+BARE = b"""#usda 1.0
+def Material "M" {
+    token outputs:surface.connect = </M/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        token outputs:surface
+    }
+}
+"""
+
+
+def written(entries: list[tuple[zipfile.ZipInfo, bytes | str]]) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as made:
+        for entry, data in entries:
+            made.writestr(entry, data)
+    return out.getvalue()
+
+
+def shown(store: AssetStore, data: bytes) -> bytes:
+    """The image of the only texture."""
+    (texture,) = store.materials(store.add(data).id).document["textures"].values()
+    return store.read(texture["asset"])
+
+
+def test_backslashes_part_folders(store: AssetStore) -> None:
+    """As some programs on Windows write them, directories as well."""
+    files = {"m\\": b"", "m\\tex\\": b"", "m\\a.obj": TEXTURED, "m\\tex\\oak.png": OAK}
+    library = "newmtl m\nmap_Kd tex/oak.png\n"
+    data = written([(zipfile.ZipInfo(name), text) for name, text in (files | {"m\\m.mtl": library}).items()])
+    info = store.add(data)
+    assert info.kind == "scene" and not info.warnings and shown(store, data) == OAK
+
+
+def test_a_name_that_is_written_once_more_in_utf_8(store: AssetStore) -> None:
+    def entry(checked: str) -> zipfile.ZipInfo:
+        made = zipfile.ZipInfo("xx.png")
+        name = b"\1" + struct.pack("<I", zlib.crc32(checked.encode())) + "木.png".encode()
+        made.extra = struct.pack("<HH", 0x5555, 1) + b"x" + struct.pack("<HH", 0x7075, len(name)) + name
+        return made
+
+    model = [(zipfile.ZipInfo("a.obj"), TEXTURED), (zipfile.ZipInfo("m.mtl"), "newmtl m\nmap_Kd 木.png\n")]
+    assert shown(store, written([*model, (entry("xx.png"), OAK)])) == OAK
+    other = store.add(written([*model, (entry("another.png"), OAK)]))
+    assert "'木.png' is not there" in str(other.warnings), "it belongs to a name that the entry had before"
+
+
+def test_the_same_file_twice_is_one(store: AssetStore) -> None:
+    files = [("a.obj", TEXTURED), ("m.mtl", "newmtl m\nmap_Kd oak.png\n"), ("oak.png", OAK), ("oak.png", OAK)]
+    with pytest.warns(UserWarning, match="Duplicate"):
+        data = written([(zipfile.ZipInfo(name), text) for name, text in files])
+    assert not store.add(data).warnings and shown(store, data) == OAK
+
+
+@pytest.mark.usd
+def test_materials_beside_a_layer_without_a_mesh(store: AssetStore) -> None:
+    """As ambientCG's downloads have them."""
+    files: dict[str, bytes | str] = {"bricks.usda": BARE, "bricks_color.png": OAK}
+    info = store.add(zipped(files))
+    assert info.kind == "materials" and shown(store, zipped(files)) == OAK
+    assert [warning["pointer"] for warning in info.warnings or ()] == ["bricks.usda"]
+    with pytest.raises(AssetError, match=r"bricks\.usda: the scene has no triangles"):
+        store.add(zipped({"bricks.usda": BARE, "cover.png": OAK}))
+    with pytest.raises(AssetError, match="no triangles"):
+        store.add(zipped(files), entry="bricks.usda")
+
+
+def test_materialx_beside_a_gltf_without_a_mesh(store: AssetStore) -> None:
+    bare = Gltf()
+    bare.tree |= {"nodes": [{}], "scenes": [{"nodes": [0]}], "scene": 0}
+    info = store.add(zipped({"a.glb": bare.glb(), "a.mtlx": MTLX}))
+    assert info.kind == "materials"
+    assert [warning["detail"] for warning in info.warnings or ()] == ["a.glb of the zip is not used by the materials"]
