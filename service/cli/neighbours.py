@@ -119,10 +119,20 @@ def _of_gltf(data: bytes, beside: _Neighbours) -> list[str] | None:
 
 
 def _of_mtlx(data: bytes, beside: _Neighbours) -> list[str]:
-    from service.formats.read.materialx.document import file_names
+    """Images, and the files that it includes with theirs."""
+    from service.formats.read.materialx.document import named
 
-    names = file_names(data)
-    return [path for name in names if (path := beside.find("", name, place="the MaterialX file")) is not None]
+    found: dict[str, None] = {}
+    left = [("", data)]
+    while left:
+        source, text = left.pop()
+        names = named(text)
+        for name in (*names.files, *names.included):
+            path = beside.find(source, name, place=source or "the MaterialX file")
+            if path is not None and path not in found and name in names.included:
+                left.append((path, beside.files.read(path)))
+            found |= {path: None} if path is not None else {}
+    return list(found)
 
 
 def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:

@@ -83,8 +83,9 @@ def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
     output = "a" if node.output == "outa" else "rgb"
     u, v = (ADDRESSES.get(mode, "repeat") for mode in modes)
     return Picture(
-        str(node.value("file", "")), node.pointer, output, space, (u, v), chart=chart, placing=placing, edges=edges
-    )
+        str(node.value("file", "")), node.pointer, output, space, (u, v), chart=chart, placing=placing, edges=edges,
+        layer=str(node.value("layer", "")),
+    )  # fmt: skip
 
 
 def _coordinates(at: Any, notes: Warnings) -> tuple[str, tuple[tuple[str, Any], ...]]:
