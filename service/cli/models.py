@@ -1,5 +1,5 @@
-"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY
-with its textures beside it, an STL or a USD file; and materials, a .mtlx with its images beside it.
+"""Models as the command line takes them: a GLB, a .gltf, an OBJ or a USD file with its files beside it, a zip of
+these, a PLY with its textures beside it, or an STL; and materials, a .mtlx with its images beside it.
 
 The importer always reads one file: a model that names others is read from a zip of all of them.
 """
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 WHOLE = ("glb", "zip", "ply", "stl", "usd", *formats.FOREIGN)  # formats that bytes tell
 SUFFIXES = tuple(f".{each}" for each, format in formats.SUFFIXES.items() if format in (*WHOLE, "gltf", "obj", "mtlx"))
 TITLES = {"obj": "the OBJ file", "mtlx": "the MaterialX file", "gltf": "the glTF file", "ply": "the PLY file"}
+TITLES |= {"usd": "the USD file"}
 
 
 def is_model(path: Path, data: bytes) -> bool:

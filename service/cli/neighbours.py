@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import posixpath
 import re
+import sys
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli import BadInput
 from service.formats.errors import ParseError
-from service.formats.formats import MODELS, decoded, text
+from service.formats.formats import CRATE, MODELS, USD_LAYERS, USD_TEXT, decoded, text
 from service.formats.read.references import URL, Finder, base_name, is_absolute, located
 from service.problems import AssetError
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]*)")
 ENDINGS = {"obj": (".obj",), "mtlx": (".mtlx",), "gltf": (".gltf",), "glb": (".glb",), "ply": (".ply",)}
-ENDINGS |= {format: (f".{format}",) for format in MODELS}
+ENDINGS |= {"usd": USD_LAYERS} | {format: (f".{format}",) for format in MODELS}
 
 
 def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes | None:
@@ -118,10 +119,42 @@ def _of_gltf(data: bytes, beside: _Neighbours) -> list[str] | None:
 
 
 def _of_mtlx(data: bytes, beside: _Neighbours) -> list[str]:
-    from service.formats.read.materialx.document import file_names
+    """Images, and the files that it includes with theirs."""
+    from service.formats.read.materialx.document import named
 
-    names = file_names(data)
-    return [path for name in names if (path := beside.find("", name, place="the MaterialX file")) is not None]
+    found: dict[str, None] = {}
+    left = [("", data)]
+    while left:
+        source, text = left.pop()
+        names = named(text)
+        for name in (*names.files, *names.included):
+            path = beside.find(source, name, place=source or "the MaterialX file")
+            if path is not None and path not in found and name in names.included:
+                left.append((path, beside.files.read(path)))
+            found |= {path: None} if path is not None else {}
+    return list(found)
+
+
+def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:
+    """Layers and images, and what these layers name in turn. Packages (.usdz) within a zip are not opened."""
+    from service.formats.read.usd_names import names_in_layer
+
+    found: dict[str, None] = {}
+    left = [("", data)]
+    while left:
+        source, layer = left.pop()
+        for name in names_in_layer(layer):
+            try:
+                path = beside.find(source, name, place=source or "the USD file")
+            except BadInput as error:  # it may be in a variant that is not shown
+                print(f"warning: {error}", file=sys.stderr)
+                continue
+            if path is None or path in found or path.lower().endswith(".usdz"):
+                continue
+            found[path] = None
+            if (content := beside.files.read(path)).startswith((CRATE, USD_TEXT)):
+                left.append((path, content))
+    return list(found) or None
 
 
 def _of_ply(data: bytes, beside: _Neighbours) -> list[str] | None:
@@ -143,5 +176,5 @@ def _of_library(data: bytes, beside: _Neighbours) -> list[str] | None:
 
 
 IMAGES = ("png", "jpg", "jpeg", "webp", "tga", "bmp", "tif", "tiff")
-_PARTS = {"obj": _of_obj, "gltf": _of_gltf, "glb": _of_gltf, "mtlx": _of_mtlx, "ply": _of_ply}
+_PARTS = {"obj": _of_obj, "gltf": _of_gltf, "glb": _of_gltf, "mtlx": _of_mtlx, "ply": _of_ply, "usd": _of_usd}
 _PARTS |= dict.fromkeys(MODELS, _of_library)

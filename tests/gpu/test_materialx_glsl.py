@@ -67,7 +67,7 @@ def test_they_agree(gpu: Renderer) -> None:
     nodes = [node(kind, f"n{k}", type, inputs) for k, (kind, type, inputs) in enumerate(NODES)]
     outputs = {f"o{k}": f"n{k} {type}" for k, (_, type, _) in enumerate(NODES)}
     text = mtlx(graph(*SOURCES, *nodes, **outputs))
-    document, shaders = read_document(text, "a.mtlx"), Glsl(text, gpu.context)
+    document, shaders = read_document("a.mtlx", lambda path: text, lambda *names: None), Glsl(text, gpu.context)
     graphs = Graphs(document, "a.mtlx", Images([], lambda name: b"", AssetLimits()), Warnings(), str)
     ((_, uv),) = bands(SIZE, SIZE, SIZE)
     own = document.getNodeGraph("NG")

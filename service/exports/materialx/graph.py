@@ -200,14 +200,13 @@ class Graph:
             self.tell(parameter, "a second set of coordinates is read by few programs")
         space = self._space(value, texture)
         colorspace = f' colorspace="{SPACES[space]}"' if type.startswith("color") else ""
-        if texture.layer is not None:
-            self.tell(parameter, f"that it is layer {texture.layer!r} of its image is not written")
         path = escape(self.images.path(value.texture, texture))
         if texture.mapping == "box":
             return self._projected(texture, parameter, type, f'type="filename" value="{path}"{colorspace}')
         if texture.mapping == "sphere":
             self.tell(parameter, "an image by sphere is written by texture coordinates")
-        inputs = [f'<input name="file" type="filename" value="{path}"{colorspace} />', self._placed(texture)]
+        inputs = [f'<input name="file" type="filename" value="{path}"{colorspace} />', *_layer(texture, "layer")]
+        inputs.append(self._placed(texture))
         for axis, wrap in zip("uv", texture.wraps, strict=True):
             if texture.wraps != ("repeat", "repeat"):
                 inputs.append(f'<input name="{axis}addressmode" type="string" value="{WRAPS[wrap]}" />')
@@ -221,6 +220,7 @@ class Graph:
         if texture.wraps != ("repeat", "repeat"):
             self.tell(parameter, "an image by box repeats in MaterialX")
         inputs = [f'<input name="file{axis}" {file} />' for axis in "xyz"]
+        inputs += [found for axis in "xyz" for found in _layer(texture, f"layer{axis}")]
         if texture.scale[0] != 1:
             position = self._node("position", "vector3", '<input name="space" type="string" value="object" />')
             by = input_of("in2", number(texture.scale[0]))
@@ -281,3 +281,8 @@ def input_of(name: str, value: Value) -> str:
 
 def input_to(name: str, type: str, node: str) -> str:
     return f'<input name="{name}" type="{type}" nodename="{node}" />'
+
+
+def _layer(texture: ImageTexture, name: str) -> list[str]:
+    """The input that names the layer of an EXR; none for the one that is shown without a name."""
+    return [] if texture.layer is None else [f'<input name="{name}" type="string" value="{escape(texture.layer)}" />']

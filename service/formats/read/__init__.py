@@ -28,6 +28,7 @@ hdr_lines    Radiance HDR: flat scan lines and the older run lengths
 measured     measured reflection
 foreign      FBX, COLLADA, 3DS, X3D, 3MF and STEP by libraries that write glTF
 usd          USD
+usd_names    the files that a USD layer names, found without its library
 materialx    MaterialX
 texture_sets  images that make materials by their names
 scenes       parts that the importers of whole scenes share

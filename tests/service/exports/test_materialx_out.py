@@ -204,14 +204,19 @@ def test_it_is_served_and_written_by_the_command(
     assert main(["import", str(tmp_path / "out.mtlx"), "-o", str(tmp_path / "again.json")]) == 0
 
 
-def test_a_layer_of_an_image_is_told(store: AssetStore) -> None:
-    """The file goes along as it is, and MaterialX' readers take their own layer of it."""
+@pytest.mark.parametrize("mapping", ["uv", "box"])
+def test_a_layer_of_an_image_is_written_and_read_again(mapping: str, store: AssetStore) -> None:
+    """The file goes along as it is."""
     texels = np.full((4, 4, 6), 0.25, np.float32)
-    layers = layered(texels, [f"{layer}.{channel}" for layer in ("AO", "beauty") for channel in "RGB"])
-    textures = {"t": {"asset": store.add(layers).id, "layer": "AO"}}
+    layers = layered(texels, [f"{layer}.{channel}" for layer in ("A&O", "beauty") for channel in "RGB"])
+    textures = {"t": {"asset": store.add(layers).id, "layer": "A&O", "mapping": mapping}}
     material = {"type": "openpbr", "base_color": {"texture": "t"}}
     exported = FORMATS["mtlx"].material_writer(
         parse_scene({**LOOK, "materials": {"m": material}, "textures": textures}), store, Config()
     )
-    assert list(exported.losses) == [("/materials/m/base_color", "that it is layer 'AO' of its image is not written")]
     assert list(exported.beside.values()) == [layers]
+    assert not exported.losses or mapping == "box"
+    files = {"a.mtlx": exported.data, **exported.beside}
+    again = read_materialx(["a.mtlx"], Finder(files), files.__getitem__, AssetLimits())
+    (found,) = again.document["textures"].values()
+    assert found["layer"] == "A&O" and found.get("mapping", "uv") == mapping

@@ -1,14 +1,15 @@
 """The text of a `.mtlx` file as the library's document, with the standard library beside it.
 
-The library's parser follows neither DOCTYPE nor entities, and inclusions only where a file is read by its name. All
-of them are refused all the same, so that a file never means less here than elsewhere.
+The library's parser follows neither DOCTYPE nor entities, which are refused all the same, so that a file never means
+less here than elsewhere. What it includes is read from the upload alone, and never by the library.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.parsers import expat
 
 from service.formats.errors import MissingExtra, ParseError
@@ -17,6 +18,7 @@ from service.formats.formats import text as utf8
 
 MOST_BYTES = 16 << 20  # of the text; the library's own is 0.6 MB for 800 nodes
 MOST_ELEMENTS = 200_000
+MOST_INCLUDED = 100  # files
 OTHER_TARGETS = ("genmdl", "genmsl", "genosl", "genslang", "lama", "translation")  # folders that nothing here needs
 MOST_DEPTH = 32  # the library recurses into elements; a graph in a document has four levels
 
@@ -27,22 +29,57 @@ def check_library() -> None:
         raise MissingExtra(f"MaterialX needs the package {package}, which is not installed on this server")
 
 
-def read_document(data: bytes, file: str) -> Any:
-    """A document of the library's. `file` is the name in errors. Raises ParseError."""
+class Named(NamedTuple):
+    """What a text calls by a name: images and the like, and other texts that it includes."""
+
+    files: list[str]
+    included: list[str]
+
+
+Included = Callable[[str, str], str | None]  # the path of the text that the one at a path includes by a name
+
+
+def read_document(file: str, read: Callable[[str], bytes], included: Included) -> Any:
+    """The text at a path, and all that it includes, as a document of the library's. Raises ParseError."""
     check_library()
+    data = read(file)
+    document = _read(data, file)
+    seen, left = {file}, [(file, data)]
+    while left:
+        source, data = left.pop()
+        for name in named(data).included:
+            path = included(source, name)
+            if path is None or path in seen:
+                continue
+            if len(seen) > MOST_INCLUDED:
+                raise ParseError(f"it includes more than the {MOST_INCLUDED} files allowed", file)
+            seen.add(path)
+            left.append((path, read(path)))
+            document.importLibrary(_read(left[-1][1], path))
+    document.setDataLibrary(_library())
+    return document
+
+
+def _read(data: bytes, file: str) -> Any:
+    """A text as a document, without what it includes. `file` is the name in errors."""
     if len(data) > MOST_BYTES:
         raise ParseError(f"it has {len(data)} bytes; {MOST_BYTES} are allowed in one .mtlx", file)
     text = utf8(data)
     _check(text, file)
     import MaterialX as mx
 
-    document = mx.createDocument()
+    document, options = mx.createDocument(), mx.XmlReadOptions()
+    options.readXIncludeFunction = None
     try:
-        mx.readFromXmlString(document, text.decode("utf-8", "replace"))
+        mx.readFromXmlString(document, text.decode("utf-8", "replace"), mx.FileSearchPath(), options)
     except Exception as error:  # the bindings translate exceptions of C++ into types of their own
         raise ParseError(f"it can't be read as MaterialX ({str(error)[:200]})", file) from None
-    document.setDataLibrary(_library())
     return document
+
+
+def is_standard(name: str) -> bool:
+    """True for the name of a file of the standard library, which every document has."""
+    return any(path.name == name.replace("\\", "/").rpartition("/")[2] for path in _library_files())
 
 
 @cache
@@ -54,8 +91,7 @@ def _library() -> Any:
     import MaterialX as mx
 
     library = mx.createDocument()
-    root = Path(mx.__file__).parent / "libraries"
-    for path in sorted(root.rglob("*.mtlx")):
+    for path in _library_files():
         if not any(part in path.parts for part in OTHER_TARGETS):
             part = mx.createDocument()
             mx.readFromXmlString(part, path.read_text())
@@ -63,25 +99,33 @@ def _library() -> Any:
     return library
 
 
-def file_names(data: bytes) -> list[str]:
-    """The files that a text names, with the prefixes of the elements around; [] for a text that is broken."""
-    parser, prefixes, found = expat.ParserCreate(), [""], dict[str, None]()
+def _library_files() -> list[Path]:
+    import MaterialX as mx
+
+    return sorted((Path(mx.__file__).parent / "libraries").rglob("*.mtlx"))
+
+
+def named(data: bytes) -> Named:
+    """The files that a text names, with the prefixes of the elements around; none of a text that is broken."""
+    parser, prefixes, found, included = expat.ParserCreate(), [""], dict[str, None](), dict[str, None]()
 
     def start(name: str, attributes: dict[str, str]) -> None:
         prefixes.append(attributes.get("fileprefix", prefixes[-1]))
         if attributes.get("type") == "filename" and attributes.get("value"):
             found[prefixes[-1] + attributes["value"]] = None
+        if name.rpartition(":")[2].lower() == "include" and attributes.get("href"):
+            included[attributes["href"]] = None
 
     parser.StartElementHandler, parser.EndElementHandler = start, lambda name: prefixes.pop()
     try:
         parser.Parse(utf8(data), True)
     except expat.ExpatError:
-        return []  # the importer says where
-    return list(found)
+        return Named([], [])  # the importer says where
+    return Named(list(found), list(included))
 
 
 def _check(text: bytes, file: str) -> None:
-    """Raise ParseError for what is not well formed, too large or too deep, and for what leads out of the file."""
+    """Raise ParseError for what is not well formed, too large or too deep, and for entities."""
     parser, depth, count = expat.ParserCreate(), 0, 0
 
     def refuse(detail: str) -> None:
@@ -90,8 +134,6 @@ def _check(text: bytes, file: str) -> None:
     def start(name: str, attributes: dict[str, str]) -> None:
         nonlocal depth, count
         depth, count = depth + 1, count + 1
-        if name.rpartition(":")[2].lower() == "include":
-            refuse("inclusions (xi:include) are refused: nothing outside of the upload is opened")
         if depth == 1 and name != "materialx":
             refuse(f"the root must be <materialx>, not <{name[:40]}>")
         if depth > MOST_DEPTH or count > MOST_ELEMENTS:

@@ -65,7 +65,7 @@ class Places:
         texels = self.texels.get(id(tree))
         if texels is None:
             assert self.images is not None
-            texels = sampled(self.images.decoded(tree.texts["file"]), self.value(tree.inputs["texcoord"]), tree)
+            texels = sampled(self.images.texels(tree), self.value(tree.inputs["texcoord"]), tree)
         if tree.size == 2 and texels.shape[1] == 4:
             return texels[:, :2]
         return texels[:, : tree.size]

@@ -251,9 +251,11 @@ class Graphs:
             self.notes.add(place, "nearest-neighbour filtering is not supported; bilinear filtering is used instead")
         if "constant" in (texts["wrap_u"], texts["wrap_v"]):
             self.notes.add(place, "a constant colour beyond the image is not supported; its edge goes on instead")
-        for ignored in ("layer" if by is None else f"layer{by[0][-1]}", "framerange"):
-            if self._text(node, definition, ignored, scope)[0]:
-                self.notes.add(f"{place}/{ignored}", "is not supported and is ignored")
+        texts["layer"] = self._layer(
+            node, definition, "layer" if by is None else f"layer{by[0][-1]}", found.path, scope
+        )
+        if self._text(node, definition, "framerange", scope)[0]:
+            self.notes.add(f"{place}/framerange", "is not supported and is ignored")
         at = self._input(node, definition, "texcoord", scope) if by is None else by[1]
         image = Tree("image", size, {"texcoord": at}, texts=texts)
         if type not in COLOURS:
@@ -262,6 +264,19 @@ class Graphs:
             texts["space"] = "srgb"
             return image
         return self._transformed(image, space, type, place)
+
+    def _layer(self, node: Any, definition: Any, name: str, path: str, scope: Scope | None) -> str:
+        """The layer of an EXR that an input names; "" for the one that is shown without a name."""
+        layer = self._text(node, definition, name, scope)[0]
+        if not layer:
+            return ""
+        try:
+            self.images.check_layer(path, layer)
+        except Unsupported as problem:
+            detail = f"{problem}; the image is shown as without this input"
+            self.notes.add(f"{self.place(node.getNamePath())}/{name}", detail)
+            return ""
+        return layer
 
     def _texcoord(self, node: Any, definition: Any, size: int, scope: Scope | None) -> Tree:
         index = fixed(self._input(node, definition, "index", scope))

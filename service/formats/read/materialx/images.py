@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from service.formats.errors import LAYER, ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.read.image import parse_image
 from service.formats.read.references import Finder, Found, is_absolute
-from service.formats.surface.trees import Unsupported
+from service.formats.surface.trees import Tree, Unsupported
 from service.formats.types import AssetLimits, Floats, ImageData
 
 FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
@@ -25,7 +26,7 @@ class Images:
     finder: Finder
     read: Callable[[str], bytes]
     limits: AssetLimits
-    _decoded: dict[str, ImageData] = field(default_factory=dict)
+    _decoded: dict[tuple[str, str], ImageData] = field(default_factory=dict)  # by path and layer
     _bytes: int = 0
 
     def located(self, reference: str, source: str) -> Found:
@@ -44,18 +45,33 @@ class Images:
             raise Unsupported(f"the image {shown} is not in a supported format ({FORMATS})")
         return found
 
-    def decoded(self, path: str) -> ImageData:
-        """Raises ParseError where the image is broken or too large."""
-        if path not in self._decoded:
+    def check_layer(self, path: str, layer: str) -> None:
+        """Raise Unsupported where an image has no such layer."""
+        try:
+            self.decoded(path, layer)
+        except ParseError as error:
+            if error.pointer != LAYER:
+                raise
+            raise Unsupported(error.detail) from None
+
+    def decoded(self, path: str, layer: str = "") -> ImageData:
+        """The image of a file, of an EXR perhaps one of its layers. Raises ParseError where it is broken or too
+        large."""
+        key = path, layer
+        if key not in self._decoded:
             data = self.read(path)
             format = sniff(data, filename=path)
             assert format is not None  # `located` has looked
-            image = parse_image(format, data, self.limits)
+            image = parse_image(format, data, self.limits, layer)
             self._bytes += image.pixels.nbytes
             if self._bytes > MOST_BYTES:
                 raise Unsupported(f"the images that must be decoded take more than {MOST_BYTES >> 20} MiB")
-            self._decoded[path] = image
-        return self._decoded[path]
+            self._decoded[key] = image
+        return self._decoded[key]
+
+    def texels(self, tree: Tree) -> ImageData:
+        """The image of a tree that reads one."""
+        return self.decoded(tree.texts["file"], tree.texts["layer"])
 
 
 def texels_of(image: ImageData, rows: slice, is_srgb: bool, channels: int = 4) -> Floats:

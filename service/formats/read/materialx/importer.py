@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.errors import ParseError
-from service.formats.read.materialx.document import check_library, read_document
+from service.formats.read.materialx.document import check_library, is_standard, named, read_document
 from service.formats.read.materialx.graph import Graphs
 from service.formats.read.materialx.images import Images
 from service.formats.read.materialx.surface import Surface
@@ -36,8 +36,9 @@ def read_materialx(
     if len(sources) > MOST_FILES:
         raise ParseError(f"it has {len(sources)} MaterialX files; {MOST_FILES} are allowed")
     reading = _Reading(finder, read, limits, several=len(sources) > 1)
-    for source in sources:
-        reading.file(source)
+    for source in reading.roots(sources):
+        if source not in reading.parts:  # of files in a circle
+            reading.file(source)
     if not reading.materials:
         raise reading.nothing_left()
     document = {
@@ -55,6 +56,7 @@ class _Reading:
     notes: Warnings = field(default_factory=Warnings)
     files: PartFiles = field(default_factory=PartFiles)
     materials: dict[str, dict[str, Any]] = field(default_factory=dict)
+    parts: set[str] = field(default_factory=set)  # files that those read include
     values: Values = field(init=False)
 
     def __post_init__(self) -> None:
@@ -68,8 +70,26 @@ class _Reading:
         }
         return {name: found for name, found in self.values.documents.items() if name in shown}
 
+    def roots(self, sources: list[str]) -> list[str]:
+        """Those of the files that no other one includes; all where that leaves none."""
+        parts = {
+            found.path
+            for source in sources
+            for name in named(self.read(source)).included
+            if (found := self.finder.find(source, name)) is not None and found.path != source
+        }
+        return [source for source in sources if source not in parts] or sources
+
+    def _included(self, source: str, name: str) -> str | None:
+        """The path of the file that the one at `source` includes; None, with a warning, where it is not there."""
+        place = self.finder.located(source, name, place=source, notes=self.notes)
+        if place is None and not is_standard(name):
+            self.notes.add(source, f"it includes {name[:100]!r}, which is not in the upload; it is read without that")
+        self.parts |= {place} if place is not None else set()
+        return place
+
     def file(self, source: str) -> None:
-        document = read_document(self.read(source), source)
+        document = read_document(source, self.read, self._included)
         prefix = f"{source}/" if self.several else ""
         graphs = Graphs(document, source, self.values.images, self.notes, lambda path: prefix + path)
         materials = document.getMaterialNodes()

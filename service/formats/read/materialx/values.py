@@ -150,7 +150,8 @@ class Values:
             return None  # channels change places
         if 3 in channels and not self._has_alpha(image):
             return None
-        settings = {"color_space": image.texts["space"]} | self._settings(image) | placing
+        layer = {"layer": image.texts["layer"]} if image.texts["layer"] else {}
+        settings = {"color_space": image.texts["space"]} | layer | self._settings(image) | placing
         key = image.texts["file"], repr(settings)
         if key not in self._names:
             file = image.texts["file"]
@@ -159,7 +160,7 @@ class Values:
         return self._names[key], [float(f"{one:.7g}") for one in by.tolist()], channels
 
     def _has_alpha(self, image: Tree) -> bool:
-        return bool(self.images.decoded(image.texts["file"]).pixels.shape[2] == 4)
+        return bool(self.images.texels(image).pixels.shape[2] == 4)
 
     def _settings(self, image: Tree) -> dict[str, Any]:
         """The wrapping and the mapping of an image, where they are not the usual ones."""
@@ -255,7 +256,7 @@ class Values:
 
     def _picked(self, image: Tree, rows: slice, size: tuple[int, int]) -> Floats | None:
         """An image's own texels, where the image to be made has as many."""
-        decoded = self.images.decoded(image.texts["file"])
+        decoded = self.images.texels(image)
         if decoded.pixels.shape[1::-1] != size:
             return None
         return texels_of(decoded, rows, image.texts["space"] == "srgb", image.size)
@@ -264,7 +265,7 @@ class Values:
         """Width and height of the image to be made: those of the largest that it reads; and bits of a channel."""
         sides, bits = [], 8
         for one in images:
-            decoded = self.images.decoded(one.texts["file"])
+            decoded = self.images.texels(one)
             sides.append(decoded.pixels.shape[1::-1])
             bits = max(bits, 8 if decoded.is_8bit else 16)
         if reads(tree, *NOISES) or not sides:

@@ -15,7 +15,9 @@ from service.formats.surface.plain import Default, Given, PlainInputs
 
 MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's modes of opacity
 # Nodes of MaterialX that hand on their input, or a channel of it.
-PASSED = ("normalmap", "convert_", "dot_", "constant_", "extract_", "separate", "swizzle_")
+SPLIT = ("extract_", "separate", "swizzle_")
+PASSED = ("normalmap", "convert_", "dot_", "constant_", *SPLIT)
+CHANNELS = dict(zip("xyzwrgba", "rgbargba", strict=True))
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class Reader(PlainInputs):
         if steps > MOST_STEPS:
             return None
         if kind.startswith(("image_", "tiledimage_")):
-            found = self.uses.texture(self.textures, materialx_picture(node, role, self.notes), role)
+            found = self.uses.texture(self.textures, materialx_picture(node, self.notes), role)
             default = node.value("default", 0.0)
             plain = default if isinstance(default, tuple) else (float(default),) * 3
             return found or (plain if node.has("default") else None)
@@ -110,16 +112,16 @@ class Reader(PlainInputs):
             return self._product(node, role, steps)
         else:
             return None
-        if kind.startswith("normalmap") and node.number("scale", 1.0) != 1:
-            self.notes.add(node.at("scale"), "the scale of a normal map is not read")
         if not isinstance(inner, Node):
-            return inner if isinstance(inner, tuple) else (float(inner),) * 3 if isinstance(inner, float) else None
-        output = node.output if node.output in "rgb" else node.output.removeprefix("out")
-        if kind.startswith(("extract", "separate", "swizzle")):
-            output = output if kind.startswith("separate") else "rgba"[int(node.number("index", 0)) % 4]
-            split = self._materialx(inner, role, steps + 1)
-            return {**split, "channel": output} if isinstance(split, dict) and output in "rgba" else split
-        return self._materialx(inner, role, steps + 1)
+            inner = (inner,) * 3 if isinstance(inner, float) else inner
+            read = inner if isinstance(inner, tuple) else None
+        else:
+            read = self._materialx(inner, role, steps + 1)
+        if read is not None and kind.startswith(SPLIT):
+            return _channel(node, read)
+        if kind.startswith("normalmap") and isinstance(read, dict) and (scale := node.number("scale", 1.0)) != 1:
+            return {**read, "scale": scale}
+        return read
 
     def _product(self, node: Node, role: Role, steps: int) -> dict[str, Any] | tuple[float, ...] | None:
         """An image times a constant."""
@@ -134,7 +136,7 @@ class Reader(PlainInputs):
             return None
         if not isinstance(found, dict):
             return tuple(a * b for a, b in zip(found[:3], factors, strict=False))
-        factor = factors[0] if role != "color" or len(set(factors)) == 1 else list(factors)
+        factor = factors[0] if len(set(factors)) == 1 else list(factors)
         return {**found, "factor": factor} if "factor" not in found else None
 
     def _read(self, node: Node, role: Role, default: tuple[float, ...]) -> dict[str, Any] | tuple[float, ...]:
@@ -155,9 +157,38 @@ class Reader(PlainInputs):
             self._unread = node
             read = self._materialx(node, role, 0)
             if read is not None:
-                return read
+                return _picked(read, 0) if role == "scalar" else read
             node = self._unread
         self.uses.unread += 1
         what = node.kind[:60] or "a node without a kind"
         self.notes.add(node.pointer, f"{what} is not supported in a material; the parameter has its default")
         return default
+
+
+Read = dict[str, Any] | tuple[float, ...]  # a reference to a texture, or its numbers
+
+
+def _channel(node: Node, read: Read) -> Read | None:
+    """The channel of what a node splits, or all of it in its own order; None for any other order."""
+    if node.kind.removeprefix("ND_").startswith("extract"):
+        names = "rgba"[int(node.number("index", 0)) % 4]
+    elif node.kind.removeprefix("ND_").startswith("separate"):
+        names = node.output.removeprefix("out")
+    else:
+        names = str(node.value("channels", ""))
+    letters = "".join(CHANNELS.get(name, "?") for name in names)
+    if letters in ("rg", "rgb", "rgba"):
+        return read
+    if len(set(letters)) != 1 or letters[0] == "?":
+        return None
+    at = "rgba".index(letters[0])
+    if not isinstance(read, dict):
+        return (read[at],) * 3 if at < len(read) else None
+    return {**_picked(read, at), "channel": letters[0]}
+
+
+def _picked(read: Read, at: int) -> Any:
+    """What is read with the factor of this channel alone."""
+    if not isinstance(read, dict) or not isinstance(read.get("factor"), list):
+        return read
+    return {**read, "factor": read["factor"][at] if at < 3 else 1.0}

@@ -17,7 +17,8 @@ from service.formats.surface.choice import lost, rich_is_better
 from service.formats.surface.inputs import PART
 
 PREVIEW = "UsdPreviewSurface"
-RICH = {f"ND_{name}_surfaceshader": MODELS[name] for name in ("standard_surface", "open_pbr_surface", "gltf_pbr")}
+SHOWN = ("standard_surface", "open_pbr_surface", "gltf_pbr", PREVIEW)
+RICH = {f"ND_{name}_surfaceshader": MODELS[name] for name in SHOWN}
 GREY = 0.8  # albedo of a mesh without a material and without a colour
 
 

@@ -9,6 +9,16 @@ from pxr import Gf, Sdf, Usd, UsdShade, Vt
 
 MOST_STEPS = 64  # nodes in a row between a parameter and its image
 
+AS_THEY_ARE = ("", "raw", "data", "unknown", "identity", "lin_rec709_scene")
+# Names of MaterialX for the library's spaces.
+SPACES = {
+    "srgb_texture": "srgb_rec709_scene", "sRGB": "srgb_rec709_scene", "lin_rec709": "lin_rec709_scene",
+    "lin_srgb": "lin_rec709_scene", "g22_rec709": "g22_rec709_scene", "g18_rec709": "g18_rec709_scene",
+    "acescg": "lin_ap1_scene", "lin_ap1": "lin_ap1_scene", "g22_ap1": "g22_ap1_scene",
+    "lin_displayp3": "lin_p3d65_scene", "srgb_displayp3": "srgb_p3d65_scene", "adobergb": "g22_adobergb_scene",
+    "lin_adobergb": "lin_adobergb_scene",
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Node:
@@ -31,9 +41,14 @@ class Node:
         return f"{self.pointer}.inputs:{name}"
 
     def has(self, name: str) -> bool:
-        """True if the file says anything about an input."""
+        """True if the file says anything about an input; the interface of a group may say nothing."""
+        return self.input(name) is not None
+
+    def space(self, name: str) -> str:
+        """The colour space of an input's value, which an interface may have; "" where the file does not say it."""
         found = self.shader.GetInput(name)
-        return bool(found) and (found.GetAttr().HasAuthoredValue() or found.HasConnectedSource())
+        sources = UsdShade.Utils.GetValueProducingAttributes(found) if found else []
+        return str(sources[0].GetColorSpace()) if sources else ""
 
     def input(self, name: str, default: Any = None) -> Any:
         """An input: a Node where it is connected to one, else a value: numbers as floats, or a tuple of them."""
@@ -65,7 +80,19 @@ def follow(given: UsdShade.Input | UsdShade.Output, time: Usd.TimeCode, default:
     if UsdShade.Output.IsOutput(source):
         shader = UsdShade.Shader(source.GetPrim())
         return Node(shader, str(source.GetBaseName()), time) if shader else default
-    return plain(source.Get(time), default)
+    return _linear(source, plain(source.Get(time), default))
+
+
+def _linear(source: Usd.Attribute, value: Any) -> Any:
+    """A colour in linear Rec.709, by the space that its attribute or a prim above names; any other value as it is."""
+    if source.GetRoleName() != Sdf.ValueRoleNames.Color or not isinstance(value, tuple):
+        return value
+    space = str(source.GetColorSpace() or Usd.ColorSpaceAPI.ComputeColorSpaceName(source, None))
+    space = SPACES.get(space, space)
+    if space in AS_THEY_ARE or len(value) < 3 or not Gf.ColorSpace.IsValid(space):
+        return value
+    linear = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709).Convert(Gf.ColorSpace(space), Gf.Vec3f(*value[:3]))
+    return (*(_shortest(each) for each in linear.GetRGB()), *value[3:])
 
 
 def surface_of(material: UsdShade.Material, context: str, time: Usd.TimeCode) -> Node | None:

@@ -19,20 +19,17 @@ from pxr import Sdf, Tf, Usd, UsdUtils, Work
 from service.formats.errors import ParseError
 from service.formats.formats import CRATE, USD_LAYERS, USD_TEXT, text
 from service.formats.read.archive import Archive
+from service.formats.read.references import Found
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd_names import WORDS
 from service.formats.types import AssetLimits
 
+PACKAGE = ".usdz"
 INSIDE, OUTSIDE = "inside:", "outside:"  # before the path of a file that is not a layer, in the package or not
 SHADERS = (".mdl", ".osl", ".oso", ".glslfx", ".mtlx")  # code, of which the importer of materials speaks
 DEEPEST = 256  # prims within prims: the library calls itself for each, and 20 000 overflow its stack
 # Braces, and what may hold some that mean nothing: texts, asset paths, comments.
-BRACES = re.compile(
-    rb"""
-    \"{3} (?:\\.|[^\\])*? \"{3} | \" (?:\\.|[^\"\\\n])* \" | '{3} (?:\\.|[^\\])*? '{3} | ' (?:\\.|[^'\\\n])* '
-    | @@@ .*? @@@ | @ [^@\n]* @ | \# [^\n]* | [{}]
-    """,
-    re.DOTALL | re.VERBOSE,
-)
+BRACES = re.compile(WORDS + rb"| [{}]", re.DOTALL | re.VERBOSE)
 ALONE = "which is not part of this one; save the scene as a .usdz, or upload a zip of its folder"
 
 
@@ -88,12 +85,16 @@ class Package:
             return identifier
         if path in composed and not lower.endswith(".mtlx"):
             what = ALONE if found is None else "which is no USD layer"
-            self.notes.add(layer or path, f"it refers to another file, {path[:100]!r}, {what}; that is left out")
+            self.notes.leave_out(
+                layer or path, f"it refers to another file, {path[:100]!r}, {what}; that is left out"
+            )
             return ""
         if found is not None and not lower.endswith(SHADERS):
             return INSIDE + found
         if lower.endswith((*USD_LAYERS, ".usdz", ".abc")) or "[" in path:
-            self.notes.add(layer or path, f"it refers to another file, {path[:100]!r}, {ALONE}; that is left out")
+            self.notes.leave_out(
+                layer or path, f"it refers to another file, {path[:100]!r}, {ALONE}; that is left out"
+            )
             return ""
         if lower.endswith(".mtlx"):
             self.notes.add(layer or path, f"the MaterialX file {path[:100]!r} is not read; what is in it is left out")
@@ -112,24 +113,46 @@ class Package:
         finder = self.files.finder
         found = finder.find(layer, path)
         if found is not None and found.remark and (there := finder.path(posixpath.normpath(path))) is not None:
-            return there
-        if found is not None and found.remark:
+            found = Found(there)
+        if found is None:
+            return None
+        if found.remark:
             self.notes.add(layer or path, found.remark)
-        return None if found is None else found.path
+        self.files.used.add(found.path)  # whether or not the variants that are selected show it
+        return found.path
 
 
 def root_layers(archive: Archive, names: list[str]) -> list[str]:
-    """Those of the layers of a zip to which no other one refers; the first where all do. Raises ParseError."""
+    """Those of the layers and packages of a zip that no other layer composes; of several those that no other of them
+    names at all, as it does a clip. The first where that leaves none. Raises ParseError."""
     if len(names) == 1 or (names and names[0] == archive.names[0] and archive.is_package):
         return names[:1]
-    referred: set[str] = set()
+    composed, named = set[str](), dict[str, set[str]]()
     for name in names:
+        if name.lower().endswith(PACKAGE):
+            continue
         layer = _read(archive.head(name, archive.size(name)), name)
-        for path in layer.GetCompositionAssetDependencies():
+        dependencies = set(layer.GetCompositionAssetDependencies())
+        for path in dependencies | set(_paths(layer)):
             found = archive.finder.find(name, path)
             if found is not None and found.path != name:
-                referred.add(found.path)
-    return [name for name in names if name not in referred] or names[:1]
+                named.setdefault(name, set()).add(found.path)
+                composed |= {found.path} if path in dependencies else set()
+    roots = [name for name in names if name not in composed] or names[:1]
+    others = {path for root in roots for path in named.get(root, ())}
+    return [name for name in roots if name not in others] or roots[:1]
+
+
+def _paths(layer: Sdf.Layer) -> list[str]:
+    """All paths of files in a layer, which is as it was afterwards."""
+    found: list[str] = []
+
+    def kept(path: str) -> str:
+        found.append(path)
+        return path
+
+    UsdUtils.ModifyAssetPaths(layer, kept)
+    return found
 
 
 def opened(data: bytes | memoryview, limits: AssetLimits, notes: Warnings) -> Package:

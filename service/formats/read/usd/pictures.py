@@ -6,7 +6,7 @@ from typing import Any
 
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.networks import Node
-from service.formats.read.usd.textures import Picture, Role
+from service.formats.read.usd.textures import Picture
 
 # Images have no metadata of this kind, without which useMetadata is black.
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "clamp"}
@@ -62,14 +62,15 @@ def _placing(node: Node) -> tuple[tuple[str, Any], ...]:
     return tuple(given)
 
 
-def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
+def materialx_picture(node: Node, notes: Warnings) -> Picture:
     """An image of MaterialX, whose values are linear unless its colour space says otherwise."""
-    named = str(node.shader.GetInput("file").GetAttr().GetColorSpace()) if node.has("file") else ""
+    is_color = "_color" in node.kind  # numbers and vectors have no space
+    named = node.space("file") if is_color else ""
     if named not in LINEAR and not named.startswith(("srgb", "g22_rec709")):
         notes.add(
             node.at("file"), f"the colour space {named[:40]!r} is not supported; linear Rec.709 is used instead"
         )
-    space: Any = "srgb" if named.startswith(("srgb", "g22_rec709")) and role == "color" else "linear"
+    space: Any = "srgb" if named.startswith(("srgb", "g22_rec709")) else "linear"
     modes = [str(node.value(f"{axis}addressmode", "periodic")) for axis in "uv"]
     lost = "a constant colour beyond the image is not supported; its edge goes on instead"
     edges = tuple((k, node.at(f"{'uv'[k]}addressmode"), lost) for k in (0, 1) if modes[k] == "constant")
@@ -83,8 +84,9 @@ def materialx_picture(node: Node, role: Role, notes: Warnings) -> Picture:
     output = "a" if node.output == "outa" else "rgb"
     u, v = (ADDRESSES.get(mode, "repeat") for mode in modes)
     return Picture(
-        str(node.value("file", "")), node.pointer, output, space, (u, v), chart=chart, placing=placing, edges=edges
-    )
+        str(node.value("file", "")), node.pointer, output, space, (u, v), chart=chart, placing=placing, edges=edges,
+        layer=str(node.value("layer", "")),
+    )  # fmt: skip
 
 
 def _coordinates(at: Any, notes: Warnings) -> tuple[str, tuple[tuple[str, Any], ...]]:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from service.colorimetry import decode_srgb, encode_srgb
-from service.formats.errors import ParseError
+from service.formats.errors import LAYER, ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.images import encode
 from service.formats.read.image import parse_image
@@ -44,6 +44,7 @@ class Picture:
     chart: str = "st"  # the name of the primvar with its texture coordinates
     placing: tuple[tuple[str, Any], ...] = ()  # members of a texture of the document
     edges: tuple[tuple[int, str, str], ...] = ()  # axes beyond whose ends it shows something else than here: told
+    layer: str = ""  # of an EXR, by its name
 
     @property
     def channel(self) -> str:
@@ -81,6 +82,8 @@ class Textures:
         if role == "scalar" and picture.channel == "a" and "A" not in bands:
             picture = _opaque(picture)
         settings: dict[str, Any] = {"color_space": "linear" if role == "normal" else _space(picture, data, bands)}
+        if picture.layer and (layer := self._layer(picture, data)):
+            settings["layer"] = layer
         scale, bias = _asked(picture, role)
         factor: dict[str, Any] = {}
         if all(abs(value) < CLOSE for value in bias) and min(scale) >= 0:
@@ -88,7 +91,9 @@ class Textures:
             if any(abs(value - 1) > CLOSE for value in scale):
                 factor = {"factor": scale[0] if len(set(scale)) == 1 else list(scale)}
         else:
-            asset = self._bake(picture, data, role, scale, bias, settings["color_space"] == "srgb")
+            asset = self._bake(
+                picture, data, role, scale, bias, settings["color_space"] == "srgb", settings.pop("layer", "")
+            )
         wrap = wrap_of(*picture.wrap)
         if wrap != "repeat":
             settings["wrap"] = wrap
@@ -116,16 +121,31 @@ class Textures:
             return None
         return data
 
+    def _layer(self, picture: Picture, data: bytes) -> str:
+        """The layer that a picture names; "", with a warning, where its image has none of that name."""
+        format = sniff(data)
+        assert format is not None  # `_read` takes only what is known
+        try:
+            parse_image(format, data, self.limits, picture.layer)
+        except ParseError as error:
+            if error.pointer != LAYER:
+                raise
+            detail = f"{error.detail}; the image is shown as without this input"
+            self.notes.add(f"{picture.pointer}.inputs:layer", detail)
+            return ""
+        return picture.layer
+
     def _bake(
-        self, picture: Picture, data: bytes, role: Role, scale: Sequence[float], bias: Sequence[float], srgb: bool
-    ) -> str:
+        self, picture: Picture, data: bytes, role: Role, scale: Sequence[float], bias: Sequence[float], srgb: bool,
+        layer: str,
+    ) -> str:  # fmt: skip
         """The reference to an image whose texels are those of `data` times a scale plus a bias, within 0..1."""
-        key = picture.path, picture.channel if role == "scalar" else role, tuple(scale), tuple(bias), srgb
+        key = picture.path, picture.channel if role == "scalar" else role, tuple(scale), tuple(bias), srgb, layer
         if key in self._baked:
             return self._baked[key]
         format = sniff(data)
         assert format is not None  # `_read` takes only what is known
-        texels: Any = parse_image(format, data, self.limits).pixels
+        texels: Any = parse_image(format, data, self.limits, layer).pixels
         is_8bit = texels.dtype == np.uint8
         values: Any = texels.astype(np.float32) / 255 if is_8bit else texels
         if role == "scalar":

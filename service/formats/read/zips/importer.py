@@ -92,7 +92,7 @@ def usd_importer() -> ModuleType:
 def _contents(archive: Archive) -> Contents:
     """The contents of a zip; of USD layers that refer to each other the first ones."""
     found = contents_of(archive)
-    layers = [name for name, format in found.models.items() if format == "usd" and not _is_package(name)]
+    layers = [name for name, format in found.models.items() if format == "usd"]
     if len(layers) > 1:
         usd_importer()
         from service.formats.read.usd.package import root_layers
