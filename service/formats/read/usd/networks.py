@@ -80,10 +80,10 @@ def follow(given: UsdShade.Input | UsdShade.Output, time: Usd.TimeCode, default:
     if UsdShade.Output.IsOutput(source):
         shader = UsdShade.Shader(source.GetPrim())
         return Node(shader, str(source.GetBaseName()), time) if shader else default
-    return _linear(source, plain(source.Get(time), default))
+    return linear(source, plain(source.Get(time), default))
 
 
-def _linear(source: Usd.Attribute, value: Any) -> Any:
+def linear(source: Usd.Attribute, value: Any) -> Any:
     """A colour in linear Rec.709, by the space that its attribute or a prim above names; any other value as it is."""
     if source.GetRoleName() != Sdf.ValueRoleNames.Color or not isinstance(value, tuple):
         return value
@@ -91,8 +91,9 @@ def _linear(source: Usd.Attribute, value: Any) -> Any:
     space = SPACES.get(space, space)
     if space in AS_THEY_ARE or len(value) < 3 or not Gf.ColorSpace.IsValid(space):
         return value
-    linear = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709).Convert(Gf.ColorSpace(space), Gf.Vec3f(*value[:3]))
-    return (*(_shortest(each) for each in linear.GetRGB()), *value[3:])
+    ours = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709)
+    found = ours.Convert(Gf.ColorSpace(space), Gf.Vec3f(*value[:3]))
+    return (*(_shortest(each) for each in found.GetRGB()), *value[3:])
 
 
 def surface_of(material: UsdShade.Material, context: str, time: Usd.TimeCode) -> Node | None:
