@@ -103,12 +103,16 @@ class Inputs(ABC):
         found = self.constant(name)
         return found is not None and found[0] > 0
 
-    def constant(self, name: str) -> list[float] | None:
-        """The value of an input that is the same everywhere; None for any other, and for one without a meaning."""
+    def known(self, tree: Tree) -> Any:
+        """(size,) as of `fixed`; None also for a tree that has no meaning here, of which `put` warns."""
         try:
-            found = self.fixed(self.tree(name))
+            return self.fixed(tree)
         except Unsupported:
             return None
+
+    def constant(self, name: str) -> list[float] | None:
+        """The value of an input that is the same everywhere; None for any other, and for one without a meaning."""
+        found = self.known(self.tree(name))
         return None if found is None else [float(one) for one in found]
 
     def number(self, name: str, otherwise: float) -> float:
@@ -135,10 +139,7 @@ class Inputs(ABC):
         return found is None or any(abs(one - neutral) > 1e-6 for one in found)
 
     def is_black(self, tree: Tree) -> bool:
-        try:
-            found = self.fixed(tree)
-        except Unsupported:
-            return False
+        found = self.known(tree)
         return found is not None and bool(np.abs(found).max() < 1e-9)
 
     def lose(self, names: Iterable[tuple[str, float, str]]) -> None:
