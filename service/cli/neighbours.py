@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from service.server.assets import FileAssets
 
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]*)")
-ENDINGS = {"obj": (".obj",), "mtlx": (".mtlx",), "gltf": (".gltf",), "glb": (".glb",), "ply": (".ply",)}
+ENDINGS: dict[str, tuple[str, ...]] = {
+    "obj": (".obj",),
+    "mtlx": (".mtlx",),
+    "gltf": (".gltf",),
+    "glb": (".glb",),
+    "ply": (".ply",),
+}
 ENDINGS |= {"usd": USD_LAYERS} | {format: (f".{format}",) for format in MODELS}
 
 

@@ -60,3 +60,17 @@ def test_tokens_in_attributes_and_blanks_before_the_first_line(store: AssetStore
         store.add(text.replace(b"</nodegraph>", b"<UDIM>"))
     with pytest.raises(AssetError, match="DOCTYPE"):
         store.add(b'<?xml version="1.0"?><!DOCTYPE m [<!ENTITY a "b">]><materialx version="1.39" a="<"/>')
+
+
+def test_inputs_that_the_library_s_version_of_a_model_lacks(store: AssetStore) -> None:
+    """Or has with another type: a number for a colour is all of its channels."""
+    given = [value("roughness", 0.25), value("shininess", 3.0), value("metallic", 0.5)]
+    found = taken(store, mtlx(surface("gltf_pbr", *given)))
+    assert (material(found)["roughness"], material(found)["metallic"]) == (0.25, 0.5)
+    assert [(one["pointer"], one["detail"]) for one in found.warnings] == [
+        ("SM/shininess", "<gltf_pbr> has no such input; it is left out")
+    ]
+    given = [value("opacity", 0.5), value("base_color", 0.25), value("specular_roughness", 0.75)]
+    found = taken(store, mtlx(surface("standard_surface", *given)))
+    assert material(found)["alpha"] == 0.5 and material(found)["roughness"] == 0.75 and not found.warnings
+    assert material(found)["base_color"] == 0.25

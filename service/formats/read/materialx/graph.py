@@ -71,7 +71,7 @@ class Graphs:
 
     def input(self, node: Any, name: str) -> Tree:
         """The tree of a node's input, or of its default. A part that has no meaning here is `unsupported`."""
-        return self._input(node, node.getNodeDef(), name, None)
+        return self._input(node, definition_of(node), name, None)
 
     def normal(self, node: Any, name: str) -> Tree | None:
         """Likewise of an input for a normal; None where that is the surface's own."""
@@ -82,7 +82,7 @@ class Graphs:
         return node.getInput(name) is not None
 
     def text(self, node: Any, name: str) -> str:
-        return self._text(node, node.getNodeDef(), name, None)[0]
+        return self._text(node, definition_of(node), name, None)[0]
 
     def _input(self, owner: Any, definition: Any, name: str, scope: Scope | None) -> Tree:
         given = owner.getInput(name)
@@ -351,6 +351,12 @@ class Graphs:
         found = self.output(graph, "", inner)
         value = fixed(found)
         return found if value is None else Tree("constant", found.size, value=value)
+
+
+def definition_of(shader: Any) -> Any:
+    """The definition of a shader; where its inputs fit none, as those of another version, that of its name. None for
+    one of another name."""
+    return shader.getNodeDef() or shader.getNodeDef("", True)
 
 
 def _unsupported(why: str, size: int) -> Tree:
