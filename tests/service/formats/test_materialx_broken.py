@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from service.problems import AssetError
 from service.server.assets import AssetStore
+from tests.asset_files import png
 from tests.mtlx_files import from_graph, graph, losses, material, mtlx, node, surface, taken, value, wire
 
+GREY = np.full((2, 2, 3), 128, np.uint8)
 MODELS = {
     "standard_surface": ("specular", "specular_IOR", "specular_color", "transmission", "transmission_color"),
     "gltf_pbr": ("specular", "ior", "specular_color", "transmission", "anisotropy_strength", "roughness"),
@@ -74,3 +77,12 @@ def test_inputs_that_the_library_s_version_of_a_model_lacks(store: AssetStore) -
     found = taken(store, mtlx(surface("standard_surface", *given)))
     assert material(found)["alpha"] == 0.5 and material(found)["roughness"] == 0.75 and not found.warnings
     assert material(found)["base_color"] == 0.25
+
+
+def test_nodes_with_an_input_too_many(store: AssetStore) -> None:
+    image = node("image", "i", "color3", value("file", "a.png", "filename"), value("wiggle", 1.0))
+    half = node("multiply", "m", "color3", wire("in1", "i"), value("in2", 0.5), value("swirl", 1.0))
+    look = surface("gltf_pbr", from_graph("base_color", "out"))
+    found = taken(store, {"a.mtlx": mtlx(graph(image, half, out="m color3"), look), "a.png": png(GREY)})
+    assert material(found)["base_color"]["factor"] == 0.5
+    assert losses(found) == {"NG/i/wiggle", "NG/m/swirl"}

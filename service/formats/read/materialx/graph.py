@@ -4,7 +4,7 @@ are taken apart, so that what is left are operations that have no such implement
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -77,6 +77,13 @@ class Graphs:
         """Likewise of an input for a normal; None where that is the surface's own."""
         found = self.input(node, name)
         return None if found.operation in ("normal", "tangent") else found
+
+    def check_inputs(self, node: Any, definition: Any, known: Container[str] = ()) -> None:
+        """Warn of inputs that neither the definition of a node has nor `known`."""
+        for given in node.getInputs():
+            if given.getName() not in known and definition.getActiveInput(given.getName()) is None:
+                place = self.place(given.getNamePath())
+                self.notes.add(place, f"<{node.getCategory()[:40]}> has no such input; it is left out")
 
     def is_given(self, node: Any, name: str) -> bool:
         return node.getInput(name) is not None
@@ -165,9 +172,10 @@ class Graphs:
         return self._trees[key]
 
     def _made(self, node: Any, output: str, scope: Scope | None) -> Tree:
-        definition, kind = node.getNodeDef(TARGET), node.getCategory()
+        definition, kind = definition_of(node, TARGET), node.getCategory()
         if definition is None:
-            raise Unsupported(f"the node <{kind[:40]}> is not one of the standard library, nor fit its inputs")
+            raise Unsupported(f"the node <{kind[:40]}> is not one of the standard library")
+        self.check_inputs(node, definition)
         if kind == "triplanarprojection":
             return self._projected(node, definition, scope)
         implementation = definition.getImplementation(TARGET)
@@ -353,10 +361,10 @@ class Graphs:
         return found if value is None else Tree("constant", found.size, value=value)
 
 
-def definition_of(shader: Any) -> Any:
-    """The definition of a shader; where its inputs fit none, as those of another version, that of its name. None for
-    one of another name."""
-    return shader.getNodeDef() or shader.getNodeDef("", True)
+def definition_of(node: Any, target: str = "") -> Any:
+    """The definition of a node; where its inputs fit none, as those of another version, that of its name and type.
+    None for one of another name."""
+    return node.getNodeDef(target) or node.getNodeDef(target, True)
 
 
 def _unsupported(why: str, size: int) -> Tree:

@@ -133,10 +133,7 @@ class _Reading:
             return
         if len(self.materials) >= MOST_MATERIALS:
             raise ParseError(f"it has more than {MOST_MATERIALS} materials", place)
-        for given in shader.getInputs():
-            if given.getName() not in model.defaults and definition.getActiveInput(given.getName()) is None:
-                detail = f"<{shader.getCategory()}> has no such input; it is left out"
-                self.notes.add(graphs.place(given.getNamePath()), detail)
+        graphs.check_inputs(shader, definition, model.defaults)
         surface = Surface(shader, graphs, self.values)
         try:
             model.read(surface)
