@@ -189,3 +189,20 @@ def test_the_real_size_of_a_tiled_image(store: AssetStore) -> None:
     found, scene = worn(store, made, {"a.png": CHANNELS})
     texture = scene.document["textures"][found["base_color"]["texture"]]
     assert (texture["scale"], texture["offset"]) == ([6, 8], [-1, 0]) and not scene.warnings
+
+
+@pytest.mark.parametrize("output", ["mtlx:displacement", "displacement", "mtlx:volume"])
+def test_what_a_material_has_beside_its_surface_is_told(store: AssetStore, output: str) -> None:
+    raised = node("D", "displacement_float", "float inputs:displacement = 1", "token outputs:out")
+    made = look("float inputs:metalness = 1", raised)
+    connected = f"token outputs:{output}.connect = </Look/D.outputs:out>\n    token outputs:mtlx:surface"
+    _, scene = worn(store, made.replace("token outputs:mtlx:surface", connected, 1))
+    (warning,) = scene.warnings
+    assert warning["pointer"] == "/Look/D" and output.rpartition(":")[2] in warning["detail"]
+
+
+def test_a_preview_s_displacement_is_an_input(store: AssetStore) -> None:
+    made = material("Look", "float inputs:displacement = 0\n        token outputs:displacement")
+    connected = "token outputs:displacement.connect = </Look/S.outputs:displacement>\n    token outputs:surface"
+    _, scene = worn(store, made.replace("token outputs:surface", connected, 1))
+    assert not scene.warnings

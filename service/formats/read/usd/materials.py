@@ -10,7 +10,7 @@ from pxr import Usd, UsdShade
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.material_reader import Edge, Reader
-from service.formats.read.usd.networks import Node, surface_of
+from service.formats.read.usd.networks import Node, others_of, surface_of
 from service.formats.read.usd.textures import Textures
 from service.formats.surface import MODELS
 from service.formats.surface.choice import lost, rich_is_better
@@ -95,6 +95,9 @@ class Materials:
 
     def _read(self, material: UsdShade.Material) -> Reader | None:
         """MaterialX first, which says more; the preview's surface where it loses less."""
+        for name, shader in others_of(material, self.time):
+            if shader.kind != PREVIEW:  # whose displacement is an input of its surface
+                self.notes.add(shader.pointer, f"the {name} of a material is not supported and is left out")
         preview, rich = surface_of(material, "", self.time), surface_of(material, "mtlx", self.time)
         if rich is None and preview is not None and preview.kind in RICH:
             preview, rich = None, preview

@@ -98,7 +98,17 @@ def linear(source: Usd.Attribute, value: Any) -> Any:
 
 def surface_of(material: UsdShade.Material, context: str, time: Usd.TimeCode) -> Node | None:
     """The shader of a material's surface in a render context; "" is everybody's."""
-    output = material.GetSurfaceOutput(context)
+    return _shader(material.GetSurfaceOutput(context), time)
+
+
+def others_of(material: UsdShade.Material, time: Usd.TimeCode) -> list[tuple[str, Node]]:
+    """The shaders of what a material has beside its surface, with the names of these things."""
+    outputs = {"displacement": material.GetDisplacementOutput, "volume": material.GetVolumeOutput}
+    found = [(name, _shader(get(context), time)) for name, get in outputs.items() for context in ("mtlx", "")]
+    return [(name, shader) for name, shader in found if shader is not None]
+
+
+def _shader(output: UsdShade.Output, time: Usd.TimeCode) -> Node | None:
     found = follow(output, time) if output else None
     return found if isinstance(found, Node) else None
 
