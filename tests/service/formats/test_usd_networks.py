@@ -12,7 +12,7 @@ from tests.asset_files import png
 from tests.exr_files import written
 from tests.mtlx_files import from_graph, graph, mtlx, surface, taken, value, wire
 from tests.mtlx_files import node as mtlx_node
-from tests.usd_files import material, mesh, usda, usdz
+from tests.usd_files import material, mesh, texture, usda, usdz
 from tests.usd_looks import CHANNELS, UV, worn
 
 pytestmark = [pytest.mark.usd, pytest.mark.slow]
@@ -206,3 +206,22 @@ def test_a_preview_s_displacement_is_an_input(store: AssetStore) -> None:
     connected = "token outputs:displacement.connect = </Look/S.outputs:displacement>\n    token outputs:surface"
     _, scene = worn(store, made.replace("token outputs:surface", connected, 1))
     assert not scene.warnings
+
+
+@pytest.mark.parametrize(
+    ("name", "type", "own", "parameter", "shown"),
+    [
+        ("diffuseColor", "color3f", "(1, 0, 0.5)", "base_color", [1, 0, 0.5]),
+        ("roughness", "float", "0.75", "roughness", 0.75),
+    ],
+)  # fmt: skip
+def test_an_input_s_own_value_stands_in_for_an_image_that_is_not_there(
+    store: AssetStore, name: str, type: str, own: str, parameter: str, shown: Any
+) -> None:
+    output = "rgb" if type == "color3f" else "r"
+    inputs = f"{type} inputs:{name} = {own}\n        {type} inputs:{name}.connect = </Look/T.outputs:{output}>"
+    found, scene = worn(store, material("Look", inputs, texture("Look", "gone.png")))
+    assert found[parameter] == shown and pointers(scene) == ["/Look/T"]
+    black = texture("Look", "gone.png", "float4 inputs:fallback = (0, 0, 0, 1)")
+    found, scene = worn(store, material("Look", inputs, black))
+    assert found[parameter] == ([0] * 3 if type == "color3f" else 0) and pointers(scene) == ["/Look/T"]

@@ -74,8 +74,10 @@ class Reader(PlainInputs):
         found = self.surface.input(name)
         if not isinstance(found, Node):
             return MODES.get(found, 0.0) if isinstance(found, str) else found
+        own = self.surface.own(name)  # for a connection that cannot be used
         if isinstance(default, tuple):
-            return self._read(found, "color", default)
+            return self._read(found, "color", own if isinstance(own, tuple) and len(own) >= 3 else default)
+        default = own if isinstance(own, float) else default
         read = self._read(found, "scalar", (default or 0.0,) * 4)
         return read if isinstance(read, dict) else read[0]
 

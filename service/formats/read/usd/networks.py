@@ -44,6 +44,11 @@ class Node:
         """True if the file says anything about an input; the interface of a group may say nothing."""
         return self.input(name) is not None
 
+    def own(self, name: str) -> Any:
+        """The value that an input has by itself, whatever it is connected to; None where it has none."""
+        found = self.shader.GetInput(name)
+        return linear(found.GetAttr(), plain(found.GetAttr().Get(self.time))) if found else None
+
     def space(self, name: str) -> str:
         """The colour space of an input's value, which an interface may have; "" where the file does not say it."""
         found = self.shader.GetInput(name)
