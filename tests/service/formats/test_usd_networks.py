@@ -225,3 +225,17 @@ def test_an_input_s_own_value_stands_in_for_an_image_that_is_not_there(
     black = texture("Look", "gone.png", "float4 inputs:fallback = (0, 0, 0, 1)")
     found, scene = worn(store, material("Look", inputs, black))
     assert found[parameter] == ([0] * 3 if type == "color3f" else 0) and pointers(scene) == ["/Look/T"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("geompropvalue_vector2", "geomprop"), ("UsdPrimvarReader_vector2", "varname")]
+)
+def test_the_coordinates_of_an_image_by_their_name(store: AssetStore, kind: str, name: str) -> None:
+    """The mesh has these only: others would be told."""
+    at = node("P", kind, f'string inputs:{name} = "lightmap"', "float2 outputs:out")
+    file = "asset inputs:file = @a.png@\n        float2 inputs:texcoord.connect = </Look/P.outputs:out>"
+    made = look("color3f inputs:base_color.connect = </Look/I.outputs:out>", image(file=file) + at)
+    alone = UV.partition("texCoord2f[] primvars:lightmap")
+    root = usda(made + mesh("Sign", f"rel material:binding = </Look>\n{alone[1]}{alone[2]}"))
+    scene = store.scene(store.add(usdz({"root.usda": root, "a.png": png(CHANNELS)})).id)
+    assert scene.document["textures"] and not scene.warnings

@@ -107,8 +107,9 @@ def _coordinates(at: Any, notes: Warnings) -> tuple[str, Placing]:
         if at.number("operationorder", 0):
             notes.add(at.pointer, "another order of place2d than scale, rotation, offset is not supported")
         placing, at = _place2d(at), at.input("texcoord")
-    if isinstance(at, Node) and at.kind.startswith("ND_geompropvalue"):
-        return str(at.value("geomprop", "st")) or "st", placing
+    for kind, name in (("ND_geompropvalue", "geomprop"), ("ND_UsdPrimvarReader_vector2", "varname")):
+        if isinstance(at, Node) and at.kind.startswith(kind):
+            return str(at.value(name, "st")) or "st", placing
     if isinstance(at, Node) and not at.kind.startswith("ND_texcoord"):
         notes.add(at.pointer, f"{at.kind[:60]} as texture coordinates is not supported; st is used instead")
     return "st", placing
