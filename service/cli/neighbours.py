@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from service.cli import BadInput
 from service.formats.errors import ParseError
-from service.formats.formats import CRATE, MODELS, USD_LAYERS, USD_TEXT, decoded, text
+from service.formats.formats import CRATE, KINDS, MODELS, USD_LAYERS, USD_TEXT, decoded, sniff, text
 from service.formats.read.references import URL, Finder, base_name, is_absolute, located
 from service.problems import AssetError
 
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from service.server.assets import FileAssets
 
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]*)")
-ENDINGS = {"obj": (".obj",), "mtlx": (".mtlx",), "gltf": (".gltf",), "glb": (".glb",), "ply": (".ply",)}
+ENDINGS: dict[str, tuple[str, ...]] = {
+    "obj": (".obj",),
+    "mtlx": (".mtlx",),
+    "gltf": (".gltf",),
+    "glb": (".glb",),
+    "ply": (".ply",),
+}
 ENDINGS |= {"usd": USD_LAYERS} | {format: (f".{format}",) for format in MODELS}
 
 
@@ -136,7 +142,7 @@ def _of_mtlx(data: bytes, beside: _Neighbours) -> list[str]:
 
 
 def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:
-    """Layers and images, and what these layers name in turn. Packages (.usdz) within a zip are not opened."""
+    """Layers and images, and what these layers name in turn."""
     from service.formats.read.usd_names import names_in_layer
 
     found: dict[str, None] = {}
@@ -149,11 +155,13 @@ def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:
             except BadInput as error:  # it may be in a variant that is not shown
                 print(f"warning: {error}", file=sys.stderr)
                 continue
-            if path is None or path in found or path.lower().endswith(".usdz"):
+            if path is None or path in found:
                 continue
-            found[path] = None
-            if (content := beside.files.read(path)).startswith((CRATE, USD_TEXT)):
+            content = beside.files.read(path)
+            if is_layer := content.startswith((CRATE, USD_TEXT)):
                 left.append((path, content))
+            if is_layer or KINDS.get(sniff(content, filename=path) or "") == "image":
+                found[path] = None
     return list(found) or None
 
 

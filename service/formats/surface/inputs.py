@@ -105,10 +105,7 @@ class Inputs(ABC):
 
     def constant(self, name: str) -> list[float] | None:
         """The value of an input that is the same everywhere; None for any other, and for one without a meaning."""
-        try:
-            found = self.fixed(self.tree(name))
-        except Unsupported:
-            return None
+        found = known(self, self.tree(name))
         return None if found is None else [float(one) for one in found]
 
     def number(self, name: str, otherwise: float) -> float:
@@ -135,10 +132,7 @@ class Inputs(ABC):
         return found is None or any(abs(one - neutral) > 1e-6 for one in found)
 
     def is_black(self, tree: Tree) -> bool:
-        try:
-            found = self.fixed(tree)
-        except Unsupported:
-            return False
+        found = known(self, tree)
         return found is not None and bool(np.abs(found).max() < 1e-9)
 
     def lose(self, names: Iterable[tuple[str, float, str]]) -> None:
@@ -189,6 +183,14 @@ class Inputs(ABC):
         turned = [round(one / length, 6) + 0.0 for one in (c * x - s * y, s * x + c * y)]
         if turned != [1.0, 0.0]:
             self.material[parameter] = [*turned, 0.0]
+
+
+def known(s: Inputs, tree: Tree) -> Any:
+    """(size,) as of `fixed`; None also for a tree that has no meaning here, of which `put` warns."""
+    try:
+        return s.fixed(tree)
+    except Unsupported:
+        return None
 
 
 def _tried(s: Inputs, tree: Tree, name: str, low: float, high: float) -> Any:

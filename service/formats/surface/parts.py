@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.formats.surface.inputs import ROUGHLY, Inputs
+from service.formats.surface.inputs import ROUGHLY, Inputs, known
 from service.formats.surface.trees import (
     Tree,
     added,
@@ -46,7 +46,7 @@ def passing(s: Inputs, base: Tree, color: Tree, share: Tree, name: str) -> Tree:
     a share, which is told at the input `name` where they differ and both are seen."""
     if s.material.get("metallic") == 1 or alike(base, color):
         return base
-    passes, both = s.fixed(share), (s.fixed(base), s.fixed(color))
+    passes, both = known(s, share), (known(s, base), known(s, color))
     is_whole = passes is not None and bool(passes[0] == 1)
     is_same = both[0] is not None and both[1] is not None and bool(np.allclose(*both, atol=1e-6))
     if not is_whole and not is_same:
@@ -66,7 +66,7 @@ def dielectric(
         s.put("ior", ior, s.tree(ior), default)
         return
     f0 = times(reflectance(s.tree(ior)), strength)
-    if s.fixed(strength) is None:
+    if known(s, strength) is None:
         s.put("specular", weight, times(f0, 1 / SPECULAR_F0))
     else:
         s.put("ior", ior, index(f0), 1.5)
@@ -76,7 +76,7 @@ def tint(s: Inputs, name: str) -> Tree:
     """Set the hue of a colour that multiplies all of the reflection; what it takes off the rest: its largest
     channel."""
     color = s.tree(name)
-    is_known = s.computes or s.fixed(color) is not None
+    is_known = s.computes or known(s, color) is not None
     share = largest(color) if is_known else constant(float(max(s.most(name))))
     if not s.is_black(color):
         s.put("specular_color", name, quotient(color, clamped(share, 1e-6, 1e6)), 1.0)

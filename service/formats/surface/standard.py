@@ -55,10 +55,11 @@ def _principled(s: Inputs) -> None:
         s.note("subsurface", "light that walks below the surface is left out", PART)
     if s.is_used("transmission", 0) and s.is_used("transmission_scatter", 0):
         s.note("transmission_scatter", "what scatters inside of the body is left out", PART)
-    base = _through(s, base, is_thin)
+    base, light = _through(s, base, is_thin), times(s.tree("emission_color"), s.tree("emission"))
     if s.is_used("coat", 0) and s.is_used("coat_color", 1):
         s.note("coat_color", "the colour of the coat tints what is under it, at all angles alike")
-        base = times(base, mixed(constant(*WHITE), s.tree("coat_color"), s.tree("coat")))
+        tint = mixed(constant(*WHITE), s.tree("coat_color"), s.tree("coat"))
+        base, light = times(base, tint), times(light, tint)
     s.put("base_color", "base_color", base, instead=s.tree("base_color"))
     s.put("roughness", "specular_roughness", s.tree("specular_roughness"))
     if s.is_used("specular_anisotropy", 0):
@@ -71,7 +72,7 @@ def _principled(s: Inputs) -> None:
     parts.film(s, "thin_film_thickness", "thin_film_IOR")
     if s.is_used("transmission_dispersion", 0):
         parts.abbe(s, s.number("transmission_dispersion", 0))
-    parts.emission(s, times(s.tree("emission_color"), s.tree("emission")), "emission", s.tree("emission_color"))
+    parts.emission(s, light, "emission", s.tree("emission_color"))
     s.put("alpha", "opacity", mean(s.tree("opacity")), 1.0)
     s.normal("normal_map", "normal")
     s.lose([

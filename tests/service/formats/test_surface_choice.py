@@ -68,6 +68,16 @@ def test_the_material_that_loses_less(model: str, inputs: dict[str, Any], type: 
     (OpenpbrMaterial if type == "openpbr" else PrincipledMaterial).model_validate(read.material)
 
 
+def test_a_coloured_coat_tints_the_emission_under_it() -> None:
+    """As in the standard library's graph; a coat that covers half does so by half."""
+    coat = {"coat": 0.5, "coat_color": RED, "coat_roughness": 0.5, "sheen": 1.0, "emission": 4.0}
+    read = Said("standard_surface", {**coat, "emission_color": HALF, "base_color": [1.0] * 3})
+    assert read.material["type"] == "principled" and "coat_color" in read.notes
+    tint = [1.0, 0.625, 0.5625]
+    assert read.material["base_color"] == pytest.approx(tint)
+    assert read.material["emission"] == pytest.approx([2 * each for each in tint])
+
+
 def test_colours_that_are_told_apart_keep_their_numbers() -> None:
     found = Said("standard_surface", PARTLY).material
     assert (found["base_color"], found["transmission_weight"]) == (0.5, 0.3) and "transmission_color" not in found

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from service.server.assets import AssetStore
+from tests.asset_files import png
 from tests.exr_files import written
-from tests.usd_files import material, mesh, usda, usdz
+from tests.mtlx_files import from_graph, graph, mtlx, surface, taken, value, wire
+from tests.mtlx_files import node as mtlx_node
+from tests.usd_files import material, mesh, texture, usda, usdz
 from tests.usd_looks import CHANNELS, UV, worn
 
 pytestmark = [pytest.mark.usd, pytest.mark.slow]
@@ -144,3 +147,95 @@ def test_a_layer_of_an_exr(store: AssetStore, layer: str, told: list[str]) -> No
     scene = store.scene(store.add(usdz({"root.usda": root, "a.exr": exr})).id)
     (texture,) = scene.document["textures"].values()
     assert texture.get("layer") == (None if told else layer) and pointers(scene) == told
+
+
+PLACED = """float2 inputs:scale = (0.5, 0.25)
+        float inputs:rotate = 30
+        float2 inputs:offset = (0.1, 0.2)
+        float2 inputs:pivot = (0.5, 0.25)
+        float2 outputs:out"""
+
+
+def test_place2d_is_what_a_mtlx_makes_of_it(store: AssetStore) -> None:
+    """With its rotation and its pivot."""
+    pytest.importorskip("MaterialX")
+    at = node("P", "place2d_vector2", *PLACED.splitlines())
+    file = f"asset inputs:file = @a.png@ {SRGB}\n        float2 inputs:texcoord.connect = </Look/P.outputs:out>"
+    made = look("color3f inputs:base_color.connect = </Look/I.outputs:out>", image(file=file) + at)
+    found, scene = worn(store, made, {"a.png": CHANNELS})
+    texture = scene.document["textures"][found["base_color"]["texture"]]
+    vectors = (value(name, each, "vector2") for name, each in
+               (("scale", [0.5, 0.25]), ("offset", [0.1, 0.2]), ("pivot", [0.5, 0.25])))  # fmt: skip
+    own = mtlx_node("texcoord", "st", "vector2")
+    turned = value("rotate", 30.0, "float")
+    place = own + mtlx_node("place2d", "P", "vector2", wire("texcoord", "st", "vector2"), *vectors, turned)
+    named = value("file", "a.png", "filename", colorspace="srgb_texture")
+    shown = mtlx_node("image", "I", "color3", named, wire("texcoord", "P", "vector2"))
+    surfaced = surface("standard_surface", from_graph("base_color", "out"))
+    other = taken(store, {"a.mtlx": mtlx(graph(place, shown, out="I color3"), surfaced), "a.png": png(CHANNELS)})
+    (expected,) = other.document["textures"].values()
+    for name in ("scale", "rotation", "offset"):
+        assert texture[name] == pytest.approx(expected[name], abs=1e-5), name
+    assert not scene.warnings
+
+
+def test_the_real_size_of_a_tiled_image(store: AssetStore) -> None:
+    size = """float2 inputs:realworldimagesize = (0.5, 0.25)
+        float2 inputs:realworldtilesize = (1, 2)
+        float2 inputs:uvtiling = (3, 1)
+        float2 inputs:uvoffset = (0.5, 0)"""
+    tiled = image(file=f"asset inputs:file = @a.png@\n        {size}").replace("ND_image", "ND_tiledimage")
+    made = look("color3f inputs:base_color.connect = </Look/I.outputs:out>", tiled)
+    found, scene = worn(store, made, {"a.png": CHANNELS})
+    texture = scene.document["textures"][found["base_color"]["texture"]]
+    assert (texture["scale"], texture["offset"]) == ([6, 8], [-1, 0]) and not scene.warnings
+
+
+@pytest.mark.parametrize("output", ["mtlx:displacement", "displacement", "mtlx:volume"])
+def test_what_a_material_has_beside_its_surface_is_told(store: AssetStore, output: str) -> None:
+    raised = node("D", "displacement_float", "float inputs:displacement = 1", "token outputs:out")
+    made = look("float inputs:metalness = 1", raised)
+    connected = f"token outputs:{output}.connect = </Look/D.outputs:out>\n    token outputs:mtlx:surface"
+    _, scene = worn(store, made.replace("token outputs:mtlx:surface", connected, 1))
+    (warning,) = scene.warnings
+    assert warning["pointer"] == "/Look/D" and output.rpartition(":")[2] in warning["detail"]
+
+
+def test_a_preview_s_displacement_is_an_input(store: AssetStore) -> None:
+    made = material("Look", "float inputs:displacement = 0\n        token outputs:displacement")
+    connected = "token outputs:displacement.connect = </Look/S.outputs:displacement>\n    token outputs:surface"
+    _, scene = worn(store, made.replace("token outputs:surface", connected, 1))
+    assert not scene.warnings
+
+
+@pytest.mark.parametrize(
+    ("name", "type", "own", "parameter", "shown"),
+    [
+        ("diffuseColor", "color3f", "(1, 0, 0.5)", "base_color", [1, 0, 0.5]),
+        ("roughness", "float", "0.75", "roughness", 0.75),
+    ],
+)  # fmt: skip
+def test_an_input_s_own_value_stands_in_for_an_image_that_is_not_there(
+    store: AssetStore, name: str, type: str, own: str, parameter: str, shown: Any
+) -> None:
+    output = "rgb" if type == "color3f" else "r"
+    inputs = f"{type} inputs:{name} = {own}\n        {type} inputs:{name}.connect = </Look/T.outputs:{output}>"
+    found, scene = worn(store, material("Look", inputs, texture("Look", "gone.png")))
+    assert found[parameter] == shown and pointers(scene) == ["/Look/T"]
+    black = texture("Look", "gone.png", "float4 inputs:fallback = (0, 0, 0, 1)")
+    found, scene = worn(store, material("Look", inputs, black))
+    assert found[parameter] == ([0] * 3 if type == "color3f" else 0) and pointers(scene) == ["/Look/T"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("geompropvalue_vector2", "geomprop"), ("UsdPrimvarReader_vector2", "varname")]
+)
+def test_the_coordinates_of_an_image_by_their_name(store: AssetStore, kind: str, name: str) -> None:
+    """The mesh has these only: others would be told."""
+    at = node("P", kind, f'string inputs:{name} = "lightmap"', "float2 outputs:out")
+    file = "asset inputs:file = @a.png@\n        float2 inputs:texcoord.connect = </Look/P.outputs:out>"
+    made = look("color3f inputs:base_color.connect = </Look/I.outputs:out>", image(file=file) + at)
+    alone = UV.partition("texCoord2f[] primvars:lightmap")
+    root = usda(made + mesh("Sign", f"rel material:binding = </Look>\n{alone[1]}{alone[2]}"))
+    scene = store.scene(store.add(usdz({"root.usda": root, "a.png": png(CHANNELS)})).id)
+    assert scene.document["textures"] and not scene.warnings

@@ -6,6 +6,7 @@ less here than elsewhere. What it includes is read from the upload alone, and ne
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from service.formats.formats import text as utf8
 MOST_BYTES = 16 << 20  # of the text; the library's own is 0.6 MB for 800 nodes
 MOST_ELEMENTS = 200_000
 MOST_INCLUDED = 100  # files
+ATTRIBUTE = re.compile(rb"=\s*+(?:\"[^\"]*+\"|'[^']*+')")
 OTHER_TARGETS = ("genmdl", "genmsl", "genosl", "genslang", "lama", "translation")  # folders that nothing here needs
 MOST_DEPTH = 32  # the library recurses into elements; a graph in a document has four levels
 
@@ -64,8 +66,12 @@ def _read(data: bytes, file: str) -> Any:
     """A text as a document, without what it includes. `file` is the name in errors."""
     if len(data) > MOST_BYTES:
         raise ParseError(f"it has {len(data)} bytes; {MOST_BYTES} are allowed in one .mtlx", file)
-    text = utf8(data)
-    _check(text, file)
+    text = utf8(data).lstrip()
+    try:
+        _check(text, file)
+    except ParseError:
+        text = _lenient(text)
+        _check(text, file)
     import MaterialX as mx
 
     document, options = mx.createDocument(), mx.XmlReadOptions()
@@ -105,8 +111,18 @@ def _library_files() -> list[Path]:
     return sorted((Path(mx.__file__).parent / "libraries").rglob("*.mtlx"))
 
 
+def _lenient(text: bytes) -> bytes:
+    """A text that XML does not allow, as the library's own parser takes it: with `<` in attributes, as in <UDIM>."""
+    return ATTRIBUTE.sub(lambda found: found[0].replace(b"<", b"&lt;"), text)
+
+
 def named(data: bytes) -> Named:
     """The files that a text names, with the prefixes of the elements around; none of a text that is broken."""
+    text = utf8(data).lstrip()
+    return _named(text) or _named(_lenient(text)) or Named([], [])  # the importer says what is broken
+
+
+def _named(text: bytes) -> Named | None:
     parser, prefixes, found, included = expat.ParserCreate(), [""], dict[str, None](), dict[str, None]()
 
     def start(name: str, attributes: dict[str, str]) -> None:
@@ -118,9 +134,9 @@ def named(data: bytes) -> Named:
 
     parser.StartElementHandler, parser.EndElementHandler = start, lambda name: prefixes.pop()
     try:
-        parser.Parse(utf8(data), True)
+        parser.Parse(text, True)
     except expat.ExpatError:
-        return Named([], [])  # the importer says where
+        return None
     return Named(list(found), list(included))
 
 

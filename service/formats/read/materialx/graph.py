@@ -4,7 +4,7 @@ are taken apart, so that what is left are operations that have no such implement
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,18 +71,25 @@ class Graphs:
 
     def input(self, node: Any, name: str) -> Tree:
         """The tree of a node's input, or of its default. A part that has no meaning here is `unsupported`."""
-        return self._input(node, node.getNodeDef(), name, None)
+        return self._input(node, definition_of(node), name, None)
 
     def normal(self, node: Any, name: str) -> Tree | None:
         """Likewise of an input for a normal; None where that is the surface's own."""
         found = self.input(node, name)
         return None if found.operation in ("normal", "tangent") else found
 
+    def check_inputs(self, node: Any, definition: Any, known: Container[str] = ()) -> None:
+        """Warn of inputs that neither the definition of a node has nor `known`."""
+        for given in node.getInputs():
+            if given.getName() not in known and definition.getActiveInput(given.getName()) is None:
+                place = self.place(given.getNamePath())
+                self.notes.add(place, f"<{node.getCategory()[:40]}> has no such input; it is left out")
+
     def is_given(self, node: Any, name: str) -> bool:
         return node.getInput(name) is not None
 
     def text(self, node: Any, name: str) -> str:
-        return self._text(node, node.getNodeDef(), name, None)[0]
+        return self._text(node, definition_of(node), name, None)[0]
 
     def _input(self, owner: Any, definition: Any, name: str, scope: Scope | None) -> Tree:
         given = owner.getInput(name)
@@ -165,9 +172,10 @@ class Graphs:
         return self._trees[key]
 
     def _made(self, node: Any, output: str, scope: Scope | None) -> Tree:
-        definition, kind = node.getNodeDef(TARGET), node.getCategory()
+        definition, kind = definition_of(node, TARGET), node.getCategory()
         if definition is None:
-            raise Unsupported(f"the node <{kind[:40]}> is not one of the standard library, nor fit its inputs")
+            raise Unsupported(f"the node <{kind[:40]}> is not one of the standard library")
+        self.check_inputs(node, definition)
         if kind == "triplanarprojection":
             return self._projected(node, definition, scope)
         implementation = definition.getImplementation(TARGET)
@@ -351,6 +359,12 @@ class Graphs:
         found = self.output(graph, "", inner)
         value = fixed(found)
         return found if value is None else Tree("constant", found.size, value=value)
+
+
+def definition_of(node: Any, target: str = "") -> Any:
+    """The definition of a node; where its inputs fit none, as those of another version, that of its name and type.
+    None for one of another name."""
+    return node.getNodeDef(target) or node.getNodeDef(target, True)
 
 
 def _unsupported(why: str, size: int) -> Tree:

@@ -8,7 +8,7 @@ from typing import Any
 
 from service.formats.errors import ParseError
 from service.formats.read.materialx.document import check_library, is_standard, named, read_document
-from service.formats.read.materialx.graph import Graphs
+from service.formats.read.materialx.graph import Graphs, definition_of
 from service.formats.read.materialx.images import Images
 from service.formats.read.materialx.surface import Surface
 from service.formats.read.materialx.values import Values
@@ -126,12 +126,14 @@ class _Reading:
 
     def _add(self, material: Any, shader: Any, graphs: Graphs) -> None:
         model, place = MODELS.get(shader.getCategory()), graphs.place(shader.getNamePath())
-        if model is None or shader.getNodeDef() is None:
+        definition = definition_of(shader)
+        if model is None or definition is None:
             known = ", ".join(MODELS)
             self.notes.add(place, f"<{shader.getCategory()[:40]}> is not supported, only {known}; it is left out")
             return
         if len(self.materials) >= MOST_MATERIALS:
             raise ParseError(f"it has more than {MOST_MATERIALS} materials", place)
+        graphs.check_inputs(shader, definition, model.defaults)
         surface = Surface(shader, graphs, self.values)
         try:
             model.read(surface)

@@ -37,6 +37,9 @@ def camera(
         for offset in (lens.GetHorizontalApertureOffsetAttr(), lens.GetVerticalApertureOffsetAttr()):
             if offset.Get(time):
                 notes.add(item.pointer, "a shifted aperture is not supported; the picture is centred")
+        stops = math.log2(max(lens.ComputeLinearExposureScale(time), 1e-30))
+        if abs(stops) > 0.01:
+            notes.add(item.pointer, f"the camera's exposure of {stops:.3g} stops is not applied")
         chosen, aspect = _placed(item, bounds), width / height
         if lens.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic:
             chosen |= {"type": "orthographic", "height": height * TENTH * unit}

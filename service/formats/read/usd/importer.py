@@ -21,14 +21,12 @@ from service.formats.read.scenes.wrapping import goes_beyond
 from service.formats.read.usd import cameras
 from service.formats.read.usd.lights import Lamp, Lights
 from service.formats.read.usd.materials import Bound, Materials
-from service.formats.read.usd.meshes import Mesh, Piece
+from service.formats.read.usd.meshes import COLOR, OPACITY, Mesh, Piece
 from service.formats.read.usd.package import Package, opened
 from service.formats.read.usd.solids import Solid, is_solid, solid
 from service.formats.read.usd.textures import Textures
-from service.formats.read.usd.walk import Item, Walk
+from service.formats.read.usd.walk import Item, Walk, metres_per_unit, up_axis
 from service.formats.types import AssetLimits, SceneFile
-
-UNSEEN = (UsdGeom.Curves, UsdGeom.Points, UsdGeom.NurbsPatch, UsdGeom.TetMesh)
 
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
@@ -59,12 +57,15 @@ class _Importer:
     def __init__(self, package: Package, limits: AssetLimits, notes: Warnings) -> None:
         self.limits, self.notes, self.files = limits, notes, PartFiles()
         self.stage = package.stage()
-        self.unit = UsdGeom.GetStageMetersPerUnit(self.stage)
+        self.unit = metres_per_unit(self.stage)
         if not 1e-9 <= self.unit <= 1e9:
             raise ParseError(f"metersPerUnit must be from 1e-9 to 1e9, not {self.unit:g}", "metersPerUnit")
         self.time = self._shown_time()
         self._pose()
-        self.items = Walk(self.stage, self.time, self.notes).items()
+        if up_axis(self.stage) not in ("Y", "Z"):
+            self.notes.add("upAxis", "an axis that is up other than Y and Z is not supported; Y is used instead")
+        self.walk = Walk(self.stage, self.time, self.notes)
+        self.items = self.walk.items()
         self.textures = Textures(package, self.files, limits, self.notes)
         self.materials = Materials(self.textures, self.time, self.unit, self.notes)
         self.placements = Placements()
@@ -80,7 +81,7 @@ class _Importer:
         for item in self.items:
             self._add(item)
         if not self._has_surface():
-            raise self.notes.nothing_left()
+            raise self._nothing_left()
         # The lamps come last, and what frames the scene does not see them.
         around = self.placements.bounds
         shapes, placed = self.placements.shapes(self.notes), self.placements.placed()
@@ -122,7 +123,7 @@ class _Importer:
         if count > self.limits.max_triangles:
             raise ParseError(f"the scene has more than the {self.limits.max_triangles} triangles allowed")
         if not count:
-            raise self.notes.nothing_left()
+            raise self._nothing_left()
         vertices, faces, uvs, at = [], [], [], 0
         for piece, item in self._pieces:
             for world in item.worlds:
@@ -146,7 +147,7 @@ class _Importer:
             self._solid(item)
         elif prim.HasAPI(UsdLux.LightAPI):
             self.lights.add(item)
-        elif any(prim.IsA(kind) for kind in UNSEEN) or prim.GetTypeName() == "Volume":
+        elif prim.IsA(UsdGeom.Gprim):
             self.notes.leave_out(item.pointer, f"{prim.GetTypeName()} is not supported and is left out")
 
     def _mesh(self, item: Item) -> Mesh:
@@ -167,10 +168,14 @@ class _Importer:
         for subset in UsdShade.MaterialBindingAPI(item.prim).GetMaterialBindSubsets():
             chosen = np.zeros(mesh.face_count, bool)
             numbers = np.array(subset.GetIndicesAttr().Get(self.time) or [], np.int64)
-            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < mesh.face_count:
-                detail = f"names face {numbers.max()}; there are {mesh.face_count}"
-                raise ParseError(detail, str(subset.GetPath()))
-            chosen[numbers] = True
+            if subset.GetElementTypeAttr().Get(self.time) != UsdGeom.Tokens.face:
+                self.notes.add(str(subset.GetPath()), "a material of a subset that is not of faces is left out")
+                continue
+            wrong = (numbers < 0) | (numbers >= mesh.face_count)
+            if wrong.any():
+                detail = f"names face {numbers[wrong][0]}; there are {mesh.face_count}; it is left out"
+                self.notes.add(str(subset.GetPath()), detail)
+            chosen[numbers[~wrong]] = True
             which = rest & chosen[mesh.face_of]
             rest &= ~which
             groups.append((np.flatnonzero(which), self.materials.of(subset.GetPrim())))
@@ -190,6 +195,10 @@ class _Importer:
         bound = self._bound(material, mesh)
         piece = mesh.piece(which, list(bound.charts), bound.is_colored)
         self._count(len(piece.faces))
+        for chart in bound.charts:
+            if not mesh.has(chart):
+                detail = f"it has no coordinates {chart[:40]!r}, which its material reads; 0 0 is used everywhere"
+                self.notes.add(mesh.pointer, detail)
         for edge in bound.edges:
             uvs = piece.uvs[bound.charts.index(edge.chart)]
             if uvs is not None and len(uvs) and goes_beyond(uvs, edge.placing)[edge.axis]:
@@ -213,7 +222,8 @@ class _Importer:
             return
         material = self.materials.of(item.prim)
         found = self.materials.use(material) if material is not None else None
-        bound = found or self.materials.plain(_color(item, self.time), False)
+        color, opacity = (_display(item, name, self.time) for name in (COLOR, OPACITY))
+        bound = found or self.materials.plain(color, False, opacity[0] if opacity else 1.0)
         if bound.charts:
             self.notes.add(item.pointer, "a body without texture coordinates in the file has its own here")
         if body.shape is not None:
@@ -239,6 +249,12 @@ class _Importer:
 
     def _has_surface(self) -> bool:
         return bool(self.placements.shown)
+
+    def _nothing_left(self) -> ParseError:
+        self.placements.shapes(self.notes)  # tells what is flat
+        if self.walk.hidden is not None:
+            self.notes.leave_out(*self.walk.hidden)
+        return self.notes.nothing_left()
 
     def _metered(self, document: dict[str, Any], placed: Any, aspect: float | None, notes: Warnings) -> float | None:
         """The exposure that suits the file's lights, where 0 does not; lamps count as points."""
@@ -280,11 +296,14 @@ class _Importer:
                 self.notes.add(pointer, "its skeleton is broken; skinned meshes are shown as they were modelled")
 
 
-def _color(item: Item, time: Usd.TimeCode) -> list[float] | None:
-    """The displayColor of a body."""
-    primvar = UsdGeom.PrimvarsAPI(item.prim).FindPrimvarWithInheritance("displayColor")
-    rows = primvar.Get(time) if primvar else None
-    return [min(max(float(value), 0.0), 1.0) for value in rows[0]] if rows else None
+def _display(item: Item, name: str, time: Usd.TimeCode) -> list[float] | None:
+    """The first value of a body's displayColor or displayOpacity."""
+    width = 3 if name == COLOR else 1
+    primvar = UsdGeom.PrimvarsAPI(item.prim).FindPrimvarWithInheritance(name)
+    values = np.array(primvar.Get(time) if primvar else [])
+    if values.dtype.kind not in "fiu" or values.size < width:
+        return None
+    return [min(max(float(value), 0.0), 1.0) for value in values.reshape(-1)[:width]]
 
 
 def _point(lamp: Lamp) -> dict[str, Any]:

@@ -18,9 +18,9 @@ from service.colorimetry import LUMINANCE
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.usd.networks import plain
+from service.formats.read.usd.networks import linear, plain
 from service.formats.read.usd.textures import Textures
-from service.formats.read.usd.walk import Item
+from service.formats.read.usd.walk import Item, up_axis
 from service.formats.types import Doubles
 
 BRIGHTEST = 1e20
@@ -130,6 +130,9 @@ class Lights:
             shape = {"type": "sphere", "center": world[:3, 3].tolist(), "radius": radius}
             self._lamp(item, shape, 4 * math.pi * radius**2, brightness, world, 0.25)
             return
+        if not radius and not self._flag(prim, "normalize"):
+            self.notes.add(item.pointer, "a light without an area is left out")
+            return
         # Of a ball of radiance L: L pi r^2; normalised L is a quarter of the power over pi r^2, whatever the radius.
         share = self._unit_area(0.25) if self._flag(prim, "normalize") else math.pi * radius**2
         intensity = _limited(brightness * share)
@@ -201,8 +204,7 @@ class Lights:
         world = item.worlds[0][:3, :3]
         if item.prim.IsA(UsdLux.DomeLight_1):
             pole = str(item.prim.GetAttribute("poleAxis").Get(self.time) or "scene")
-            up = item.prim.GetStage().GetMetadata("upAxis")
-            if pole == "Z" or (pole == "scene" and up == "Z"):
+            if pole == "Z" or (pole == "scene" and up_axis(item.prim.GetStage()) == "Z"):
                 # The pole lies along the stage's z: what was y turns there.
                 world = world @ np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
         forward, pole_w = world[:, 2], world[:, 1]
@@ -216,7 +218,7 @@ class Lights:
     def _brightness(self, prim: Usd.Prim) -> Doubles:
         default = 50000.0 if prim.IsA(UsdLux.DistantLight) else 1.0
         strength = self._number(prim, "intensity", default) * 2.0 ** min(self._number(prim, "exposure", 0.0), 1000.0)
-        color = plain(self._value(prim, "color"), (1.0,) * 3)
+        color = self._color(prim)
         if self._flag(prim, "enableColorTemperature"):
             warm = UsdLux.BlackbodyTemperatureAsRgb(self._number(prim, "colorTemperature", 6500.0))
             color = tuple(a * b for a, b in zip(color, plain(warm), strict=True))
@@ -253,6 +255,12 @@ class Lights:
             if found and found.HasValue() and (full == name or found.HasAuthoredValue()):
                 return found.Get(self.time)
         return None
+
+    def _color(self, prim: Usd.Prim) -> tuple[float, ...]:
+        """In linear Rec.709."""
+        found = prim.GetAttribute("inputs:color")
+        value = plain(self._value(prim, "color"), (1.0,) * 3)
+        return tuple(linear(found, value)) if found else value
 
     def _number(self, prim: Usd.Prim, name: str, default: float) -> float:
         found = plain(self._value(prim, name), default)

@@ -17,6 +17,7 @@ MODES = {"transparent": 0.0, "presence": 1.0}  # names of UsdPreviewSurface's mo
 # Nodes of MaterialX that hand on their input, or a channel of it.
 SPLIT = ("extract_", "separate", "swizzle_")
 PASSED = ("normalmap", "convert_", "dot_", "constant_", *SPLIT)
+Read = dict[str, Any] | tuple[float, ...]  # a reference to a texture, or its numbers
 CHANNELS = dict(zip("xyzwrgba", "rgbargba", strict=True))
 
 
@@ -73,8 +74,10 @@ class Reader(PlainInputs):
         found = self.surface.input(name)
         if not isinstance(found, Node):
             return MODES.get(found, 0.0) if isinstance(found, str) else found
+        own = self.surface.own(name)  # for a connection that cannot be used
         if isinstance(default, tuple):
-            return self._read(found, "color", default)
+            return self._read(found, "color", own if isinstance(own, tuple) and len(own) >= 3 else default)
+        default = own if isinstance(own, float) else default
         read = self._read(found, "scalar", (default or 0.0,) * 4)
         return read if isinstance(read, dict) else read[0]
 
@@ -112,10 +115,10 @@ class Reader(PlainInputs):
             return self._product(node, role, steps)
         else:
             return None
-        if not isinstance(inner, Node):
-            inner = (inner,) * 3 if isinstance(inner, float) else inner
-            read = inner if isinstance(inner, tuple) else None
-        else:
+        read: Read | None = inner if isinstance(inner, tuple) else None
+        if isinstance(inner, float):
+            read = (inner,) * 3
+        elif isinstance(inner, Node):
             read = self._materialx(inner, role, steps + 1)
         if read is not None and kind.startswith(SPLIT):
             return _channel(node, read)
@@ -163,9 +166,6 @@ class Reader(PlainInputs):
         what = node.kind[:60] or "a node without a kind"
         self.notes.add(node.pointer, f"{what} is not supported in a material; the parameter has its default")
         return default
-
-
-Read = dict[str, Any] | tuple[float, ...]  # a reference to a texture, or its numbers
 
 
 def _channel(node: Node, read: Read) -> Read | None:

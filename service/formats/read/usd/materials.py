@@ -10,7 +10,7 @@ from pxr import Usd, UsdShade
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.material_reader import Edge, Reader
-from service.formats.read.usd.networks import Node, surface_of
+from service.formats.read.usd.networks import Node, others_of, surface_of
 from service.formats.read.usd.textures import Textures
 from service.formats.surface import MODELS
 from service.formats.surface.choice import lost, rich_is_better
@@ -43,9 +43,17 @@ class Materials:
     _colors: dict[tuple[float, ...], Bound] = field(default_factory=dict)
 
     def of(self, prim: Usd.Prim) -> UsdShade.Material | None:
-        """The material that is bound to a mesh, or to a part of one."""
-        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
-        return material if material else None
+        """The material that is bound to a mesh, or to a part of one: for final pictures, for all, or for previews."""
+        for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview):
+            material, relation = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(purpose)
+            if material:
+                return material
+            if relation:
+                lost = next((str(path) for path in relation.GetTargets()), "")
+                detail = f"the material {lost[:100]} that it names is not in this file; it is shown without one"
+                self.notes.add(str(relation.GetPrim().GetPath()), detail)
+                return None
+        return None
 
     def key(self, material: UsdShade.Material | None) -> str:
         """Equal for the same material in all instances of a prim."""
@@ -66,14 +74,15 @@ class Materials:
             self._bound[key] = Bound(name, tuple(read.uses.charts), read.uses.is_colored, tuple(read.uses.edges))
         return self._bound[key]
 
-    def plain(self, color: list[float] | None, is_colored: bool) -> Bound:
+    def plain(self, color: list[float] | None, is_colored: bool, opacity: float = 1.0) -> Bound:
         """A material for what has none: in the one colour of a mesh, in those of its vertices, or grey."""
         shown = (1.0,) * 3 if is_colored else tuple(color or (GREY,) * 3)
-        key = (*shown, float(is_colored))
+        key = (*shown, float(is_colored), opacity)
         if key not in self._colors:
             base = "vertex colours" if is_colored else "colour" if color else "default"
             name = unique(base, self.documents)
-            self.documents[name] = {"type": "principled", "base_color": list(shown), "roughness": 0.5}
+            fades = {"alpha": opacity} if opacity < 1 else {}
+            self.documents[name] = {"type": "principled", "base_color": list(shown), "roughness": 0.5, **fades}
             self._colors[key] = Bound(name, (), is_colored)
         return self._colors[key]
 
@@ -86,6 +95,9 @@ class Materials:
 
     def _read(self, material: UsdShade.Material) -> Reader | None:
         """MaterialX first, which says more; the preview's surface where it loses less."""
+        for name, shader in others_of(material, self.time):
+            if shader.kind != PREVIEW:  # whose displacement is an input of its surface
+                self.notes.add(shader.pointer, f"the {name} of a material is not supported and is left out")
         preview, rich = surface_of(material, "", self.time), surface_of(material, "mtlx", self.time)
         if rich is None and preview is not None and preview.kind in RICH:
             preview, rich = None, preview

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from pxr import Usd, UsdGeom
 
-from service.formats.errors import ParseError
 from service.formats.read.bad_elements import counted, left_out, unused_places, whole_faces
 from service.formats.read.polygons import Longs, triangulate
 from service.formats.read.raw_mesh import area_weighted
@@ -61,7 +60,9 @@ class Mesh:
         counts = _array(mesh.GetFaceVertexCountsAttr().Get(time)).astype(np.int64)
         self.face_count = len(counts)
         if len(corners) != counts.sum() or (len(counts) and counts.min() < 0):
-            raise ParseError(f"{counts.sum()} corners make its faces, and it has {len(corners)}", self.pointer)
+            detail = f"{counts.sum()} corners make its faces, and it has {len(corners)}; the mesh is left out"
+            notes.leave_out(self.pointer, detail)
+            corners, counts = corners[:0], counts[:0]
         self._corners = corners
         self._face_of_corner = np.repeat(np.arange(len(counts)), counts)
         whole, reason = whole_faces(self.points, corners, counts, counted("face"))
@@ -127,6 +128,11 @@ class Mesh:
             f"primvars:{name}", primvar.Get(self._time), primvar.GetIndices(self._time),
             str(primvar.GetInterpolation()), width,
         )  # fmt: skip
+
+    def has(self, name: str) -> bool:
+        """True if there is a primvar of this name, whether or not it fits."""
+        found = self._api.FindPrimvarWithInheritance(name)
+        return bool(found) and bool(found.HasValue())
 
     def has_color(self) -> bool:
         return self.primvar(COLOR, 3) is not None

@@ -44,6 +44,11 @@ class Node:
         """True if the file says anything about an input; the interface of a group may say nothing."""
         return self.input(name) is not None
 
+    def own(self, name: str) -> Any:
+        """The value that an input has by itself, whatever it is connected to; None where it has none."""
+        found = self.shader.GetInput(name)
+        return linear(found.GetAttr(), plain(found.GetAttr().Get(self.time))) if found else None
+
     def space(self, name: str) -> str:
         """The colour space of an input's value, which an interface may have; "" where the file does not say it."""
         found = self.shader.GetInput(name)
@@ -80,10 +85,10 @@ def follow(given: UsdShade.Input | UsdShade.Output, time: Usd.TimeCode, default:
     if UsdShade.Output.IsOutput(source):
         shader = UsdShade.Shader(source.GetPrim())
         return Node(shader, str(source.GetBaseName()), time) if shader else default
-    return _linear(source, plain(source.Get(time), default))
+    return linear(source, plain(source.Get(time), default))
 
 
-def _linear(source: Usd.Attribute, value: Any) -> Any:
+def linear(source: Usd.Attribute, value: Any) -> Any:
     """A colour in linear Rec.709, by the space that its attribute or a prim above names; any other value as it is."""
     if source.GetRoleName() != Sdf.ValueRoleNames.Color or not isinstance(value, tuple):
         return value
@@ -91,13 +96,24 @@ def _linear(source: Usd.Attribute, value: Any) -> Any:
     space = SPACES.get(space, space)
     if space in AS_THEY_ARE or len(value) < 3 or not Gf.ColorSpace.IsValid(space):
         return value
-    linear = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709).Convert(Gf.ColorSpace(space), Gf.Vec3f(*value[:3]))
-    return (*(_shortest(each) for each in linear.GetRGB()), *value[3:])
+    ours = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709)
+    found = ours.Convert(Gf.ColorSpace(space), Gf.Vec3f(*value[:3]))
+    return (*(_shortest(each) for each in found.GetRGB()), *value[3:])
 
 
 def surface_of(material: UsdShade.Material, context: str, time: Usd.TimeCode) -> Node | None:
     """The shader of a material's surface in a render context; "" is everybody's."""
-    output = material.GetSurfaceOutput(context)
+    return _shader(material.GetSurfaceOutput(context), time)
+
+
+def others_of(material: UsdShade.Material, time: Usd.TimeCode) -> list[tuple[str, Node]]:
+    """The shaders of what a material has beside its surface, with the names of these things."""
+    outputs = {"displacement": material.GetDisplacementOutput, "volume": material.GetVolumeOutput}
+    found = [(name, _shader(get(context), time)) for name, get in outputs.items() for context in ("mtlx", "")]
+    return [(name, shader) for name, shader in found if shader is not None]
+
+
+def _shader(output: UsdShade.Output, time: Usd.TimeCode) -> Node | None:
     found = follow(output, time) if output else None
     return found if isinstance(found, Node) else None
 

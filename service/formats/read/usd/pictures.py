@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from service.formats.read.scenes.warnings import Warnings
@@ -13,6 +14,8 @@ WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "cla
 DARK = ("black", "useMetadata")
 ADDRESSES = {"periodic": "repeat", "mirror": "mirror", "clamp": "clamp", "constant": "clamp"}
 LINEAR = ("", "raw", "data", "lin_rec709", "lin_rec709_scene", "Raw", "none", "auto")
+
+Placing = tuple[tuple[str, Any], ...]  # members of a texture of the document
 
 
 def picture(node: Node, notes: Warnings) -> Picture:
@@ -27,7 +30,7 @@ def picture(node: Node, notes: Warnings) -> Picture:
     spaces = {"raw": "linear", "sRGB": "srgb"}
     space: Any = spaces.get(str(node.value("sourceColorSpace", "auto")), "auto")
     chart = "st"
-    placing: tuple[tuple[str, Any], ...] = ()
+    placing: Placing = ()
     at = node.input("st")
     steps = 0
     while isinstance(at, Node) and at.kind == "UsdTransform2d":
@@ -48,7 +51,7 @@ def picture(node: Node, notes: Warnings) -> Picture:
     )  # fmt: skip
 
 
-def _placing(node: Node) -> tuple[tuple[str, Any], ...]:
+def _placing(node: Node) -> Placing:
     """A UsdTransform2d: scale, then rotation, then translation, as the document's texture has them."""
     scale, offset = node.numbers("scale", (1.0, 1.0)), node.numbers("translation", (0.0, 0.0))
     rotation = node.number("rotation", 0.0)
@@ -75,12 +78,11 @@ def materialx_picture(node: Node, notes: Warnings) -> Picture:
     lost = "a constant colour beyond the image is not supported; its edge goes on instead"
     edges = tuple((k, node.at(f"{'uv'[k]}addressmode"), lost) for k in (0, 1) if modes[k] == "constant")
     chart, placing = _coordinates(node.input("texcoord"), notes)
-    if "tiledimage" in node.kind:
-        tiling, moved = node.numbers("uvtiling", (1.0, 1.0)), node.numbers("uvoffset", (0.0, 0.0))
-        if placing and (tiling != (1.0, 1.0) or moved != (0.0, 0.0)):
+    if "tiledimage" in node.kind and (tiled := _tiling(node)):
+        if placing:
             notes.add(node.pointer, "a tiled image under a second transform is not supported; the tiling is ignored")
-        elif tiling != (1.0, 1.0) or moved != (0.0, 0.0):
-            placing = (("scale", list(tiling)), ("offset", [-moved[0], -moved[1]]))
+        else:
+            placing = tiled
     output = "a" if node.output == "outa" else "rgb"
     u, v = (ADDRESSES.get(mode, "repeat") for mode in modes)
     return Picture(
@@ -89,18 +91,41 @@ def materialx_picture(node: Node, notes: Warnings) -> Picture:
     )  # fmt: skip
 
 
-def _coordinates(at: Any, notes: Warnings) -> tuple[str, tuple[tuple[str, Any], ...]]:
-    """The primvar with texture coordinates, and how they are transformed: place2d divides by its scale."""
-    placing: tuple[tuple[str, Any], ...] = ()
+def _tiling(node: Node) -> Placing:
+    """How a tiled image lies: so many times in a unit of the coordinates, or as large as it really is."""
+    tiles, moved = node.numbers("uvtiling", (1.0, 1.0)), node.numbers("uvoffset", (0.0, 0.0))
+    image, tile = (node.numbers(f"realworld{name}size", (1.0, 1.0)) for name in ("image", "tile"))
+    size = [b / a if a else 1.0 for a, b in zip(image, tile, strict=True)]
+    scale, offset = ([a * b for a, b in zip(each, size, strict=True)] for each in (tiles, moved))
+    return () if scale == [1, 1] and offset == [0, 0] else _placed(scale, 0.0, [-each for each in offset])
+
+
+def _coordinates(at: Any, notes: Warnings) -> tuple[str, Placing]:
+    """The primvar with texture coordinates, and how they are transformed."""
+    placing: Placing = ()
     if isinstance(at, Node) and at.kind.startswith("ND_place2d"):
-        scale, offset = at.numbers("scale", (1.0, 1.0)), at.numbers("offset", (0.0, 0.0))
-        if at.number("rotate", 0.0) or at.numbers("pivot", (0.0, 0.0)) != (0.0, 0.0) or not all(scale):
-            notes.add(at.pointer, "the rotation and the pivot of place2d are not supported; they are ignored")
-        scale = tuple(1 / one if one else 1.0 for one in scale)
-        placing = (("scale", list(scale)), ("offset", [-offset[0], -offset[1]]))
-        at = at.input("texcoord")
-    if isinstance(at, Node) and at.kind.startswith("ND_geompropvalue"):
-        return str(at.value("geomprop", "st")) or "st", placing
+        if at.number("operationorder", 0):
+            notes.add(at.pointer, "another order of place2d than scale, rotation, offset is not supported")
+        placing, at = _place2d(at), at.input("texcoord")
+    for kind, name in (("ND_geompropvalue", "geomprop"), ("ND_UsdPrimvarReader_vector2", "varname")):
+        if isinstance(at, Node) and at.kind.startswith(kind):
+            return str(at.value(name, "st")) or "st", placing
     if isinstance(at, Node) and not at.kind.startswith("ND_texcoord"):
         notes.add(at.pointer, f"{at.kind[:60]} as texture coordinates is not supported; st is used instead")
     return "st", placing
+
+
+def _place2d(node: Node) -> Placing:
+    """R S (uv - pivot) - offset + pivot, where S divides by the scale and R turns clockwise."""
+    pivot, offset = node.numbers("pivot", (0.0, 0.0)), node.numbers("offset", (0.0, 0.0))
+    u, v = (1 / one if one else 1.0 for one in node.numbers("scale", (1.0, 1.0)))
+    turn = -node.number("rotate", 0.0)
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    x, y = u * pivot[0], v * pivot[1]
+    moved = pivot[0] - (c * x - s * y) - offset[0], pivot[1] - (s * x + c * y) - offset[1]
+    return _placed([u, v], turn, [round(each, 9) + 0.0 for each in moved])
+
+
+def _placed(scale: list[float], rotation: float, offset: list[float]) -> Placing:
+    """A placing as members of a texture of the document."""
+    return (("scale", scale), *((("rotation", rotation),) if rotation else ()), ("offset", offset))

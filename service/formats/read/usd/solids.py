@@ -15,7 +15,8 @@ from service.formats.types import Doubles, Indices
 AROUND, ALONG = 96, 48  # segments about the axis of a round body, and from pole to pole
 ROUGHLY = 16  # the same where the triangles stand for a body only to see it whole and to meter light
 AXES = {"X": (1, 2, 0), "Y": (2, 0, 1), "Z": (0, 1, 2)}  # which axes the local x, y and z become
-KINDS = (UsdGeom.Sphere, UsdGeom.Cube, UsdGeom.Cylinder, UsdGeom.Cone, UsdGeom.Capsule, UsdGeom.Plane)
+TAPERED = (UsdGeom.Cylinder_1, UsdGeom.Capsule_1)  # with a radius at each end
+KINDS = (UsdGeom.Sphere, UsdGeom.Cube, UsdGeom.Cylinder, UsdGeom.Cone, UsdGeom.Capsule, UsdGeom.Plane, *TAPERED)
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,10 @@ def solid(prim: Usd.Prim, time: Usd.TimeCode) -> Solid | None:
     if prim.IsA(UsdGeom.Plane):
         sides = size("width", 2.0), size("length", 2.0)
         return _plane(*sides, str(prim.GetAttribute("axis").Get(time) or "Z")) if _is_positive(*sides) else None
+    bottom = top = radius
+    if any(prim.IsA(kind) for kind in TAPERED):
+        bottom, top = size("radiusBottom", 0.5), size("radiusTop", 0.5)
+        radius, height = max(bottom, top) if min(bottom, top) >= 0 else 0.0, size("height", 1.0)
     if not _is_positive(radius) or (not prim.IsA(UsdGeom.Sphere) and not _is_positive(height)):
         return None
     if prim.IsA(UsdGeom.Sphere):
@@ -55,11 +60,15 @@ def solid(prim: Usd.Prim, time: Usd.TimeCode) -> Solid | None:
         return Solid(ball, *_turned(profile, "Z", ROUGHLY)[:2])
     half = height / 2
     along = str(prim.GetAttribute("axis").Get(time) or "Z")
-    if prim.IsA(UsdGeom.Cylinder):
+    lean = bottom - top
+    if prim.IsA(UsdGeom.Cylinder) or prim.IsA(UsdGeom.Cylinder_1):
+        side = height / math.hypot(lean, height), lean / math.hypot(lean, height)
         profile = [
-            ((0, -half), (0, -1)), ((radius, -half), (0, -1)), ((radius, -half), (1, 0)), ((radius, half), (1, 0)),
-            ((radius, half), (0, 1)), ((0, half), (0, 1)),
+            ((0, -half), (0, -1)), ((bottom, -half), (0, -1)), ((bottom, -half), side), ((top, half), side),
+            ((top, half), (0, 1)), ((0, half), (0, 1)),
         ]  # fmt: skip
+        if lean:
+            return Solid(None, *_turned(profile, along, AROUND))
         up = [float(name == along) for name in AXES] if along in AXES else [0.0, 0.0, 1.0]
         base, axis = ([way * x for x in up] for way in (-half, height))
         pipe = {"type": "cylinder", "base": base, "axis": axis, "radius": radius}
@@ -68,7 +77,9 @@ def solid(prim: Usd.Prim, time: Usd.TimeCode) -> Solid | None:
         slope = height / math.hypot(radius, height), radius / math.hypot(radius, height)
         profile = [((0, -half), (0, -1)), ((radius, -half), (0, -1)), ((radius, -half), slope), ((0, half), slope)]
     else:
-        low, high = _arc(radius, math.pi, math.pi / 2, ALONG // 4), _arc(radius, math.pi / 2, 0.0, ALONG // 4)
+        # The side touches both balls; where one is within the other there is none.
+        meet = math.acos(min(max(lean / height, -1.0), 1.0))
+        low, high = _arc(bottom, math.pi, meet, ALONG // 4), _arc(top, meet, 0.0, ALONG // 4)
         profile = [((r, z - half), n) for (r, z), n in low] + [((r, z + half), n) for (r, z), n in high]
     return Solid(None, *_turned(profile, along, AROUND))
 
