@@ -91,7 +91,7 @@ def _open(format: str, data: bytes, limits: AssetLimits) -> Any:
         image = opened(data, [PILLOW[format]])
     except UnidentifiedImageError:
         raise ParseError(f"it begins as {format.upper()} does, but can't be read") from None
-    check_size(*image.size, limits)
+    check_size(image.width, image.height, limits)
     return image
 
 

@@ -9,7 +9,9 @@ from typing import Any
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, OTHER_MODELS, UNREAD, sniff
 from service.formats.read.archive import Archive
+from service.formats.read.image import PILLOW
 from service.formats.read.obj.textures import FORMATS
+from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
@@ -106,6 +108,17 @@ class _Textures:
         return self._names[key]
 
 
+def _without_alpha(data: bytes) -> bool:
+    """True for an image without transparency, whose alpha says nothing."""
+    if sniff(data) not in PILLOW:
+        return False
+    try:
+        image = opened(data, list(PILLOW.values()))
+    except (OSError, SyntaxError, ValueError):
+        return False  # it is refused as a part
+    return "A" not in image.getbands() and "transparency" not in image.info
+
+
 def _is_baked(source: RoleImage, role: Role) -> bool:
     return role == "gloss" or (role == "normal" and bool(source.meaning.directx))
 
@@ -113,6 +126,9 @@ def _is_baked(source: RoleImage, role: Role) -> bool:
 def _material(images: TextureSet, textures: _Textures, notes: Warnings) -> dict[str, Any]:
     out: dict[str, Any] = {"type": "principled"}
     for role, source in images.sources.items():
+        if source.channel == "a" and _without_alpha(textures.images[source.path]):
+            notes.add(source.path, f"it has no alpha channel, from which its {role} would be read")
+            continue
         name = textures.use(source, role)
         if role == "color":
             out["base_color"] = {"texture": name}
