@@ -34,7 +34,7 @@ def read(store: AssetStore, names: str, texels: np.ndarray = RGBA) -> tuple[dict
 @pytest.mark.parametrize("flow", ["METALNESS", "SPECULAR"])
 def test_poliigon_says_the_workflow_after_the_size(store: AssetStore, flow: str) -> None:
     materials, warnings = read(
-        store, " ".join(f"Sand002_{what}_2K_{flow}" for what in ("COL", "NRM", "ROUGHNESS", flow))
+        store, " ".join(f"Sand002_{what}_2K_{flow}" for what in ("COL", "NRM", "ROUGHNESS", flow)), RGB
     )
     assert materials == {
         "Sand002": {
@@ -110,3 +110,12 @@ def test_alpha_is_read_where_there_is_one(store: AssetStore) -> None:
     assert none[1] == [
         f"it has no alpha channel, from which its {what} would be read" for what in ("opacity", "gloss")
     ]
+
+
+def test_alpha_that_no_name_explains_is_told(store: AssetStore) -> None:
+    said = ["its alpha is left out: no image's name says that it is the opacity"]
+    assert read(store, "leaf_color leaf_rough")[1] == said
+    assert read(store, "leaf_color leaf_opacity")[1] == []
+    assert read(store, "leaf_color leaf_rough", RGB)[1] == []
+    opaque = np.concatenate([RGB, np.full((4, 4, 1), 255, np.uint8)], axis=2)
+    assert read(store, "leaf_color", opaque)[1] == []

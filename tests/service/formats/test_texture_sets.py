@@ -231,6 +231,8 @@ def test_a_zip_without_such_images_is_refused(store: AssetStore) -> None:
         store.add(zipped({"IMG_1.png": make.png(COLOR)}))
     with pytest.raises(AssetError, match=r"a_color\.png"):
         store.add(zipped({"a_color.png": make.png(COLOR)[:60], "a_rough.png": make.png(GREY)}))
+    with pytest.raises(AssetError, match=r"a_gloss\.png: the file is cut off"):
+        store.add(zipped({"a_color.png": make.png(COLOR), "a_gloss.png": make.png(GREY)[:60]}))
     with pytest.raises(NotFound, match="holds materials"):
         store.scene(store.add(zipped({"b_color.png": make.png(COLOR)})).id)
 

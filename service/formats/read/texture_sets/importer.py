@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import posixpath
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +17,7 @@ from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.texture_sets.baking import inverted, turned
+from service.formats.read.texture_sets.baking import inverted, is_transparent, turned
 from service.formats.read.texture_sets.names import FIRST_TILE, Role
 from service.formats.read.texture_sets.real_size import Size, by_names, by_note
 from service.formats.read.texture_sets.sets import UDIM, RoleImage, TextureSet, texture_sets
@@ -108,6 +110,17 @@ class _Textures:
         return self._names[key]
 
 
+@contextmanager
+def _at(path: str) -> Iterator[None]:
+    """Names the image that can't be read."""
+    try:
+        yield
+    except ParseError as error:
+        raise ParseError(error.detail, path[:100]) from None
+    except (OSError, SyntaxError, ValueError) as error:
+        raise ParseError(f"it can't be read ({str(error)[:100]})", path[:100]) from None
+
+
 def _without_alpha(data: bytes) -> bool:
     """True for an image without transparency, whose alpha says nothing."""
     if sniff(data) not in PILLOW:
@@ -129,9 +142,13 @@ def _material(images: TextureSet, textures: _Textures, notes: Warnings) -> dict[
         if source.channel == "a" and _without_alpha(textures.images[source.path]):
             notes.add(source.path, f"it has no alpha channel, from which its {role} would be read")
             continue
-        name = textures.use(source, role)
+        with _at(source.path):
+            name = textures.use(source, role)
+            is_cut_out = role == "color" and is_transparent(textures.images[source.path], textures.limits)
         if role == "color":
             out["base_color"] = {"texture": name}
+            if is_cut_out and "opacity" not in images.sources:
+                notes.add(source.path, "its alpha is left out: no image's name says that it is the opacity")
         elif role == "emission":
             out["emission"] = {"texture": name}
         elif role == "normal":
