@@ -102,14 +102,16 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
 
 
 def test_a_layer_of_an_image_is_named(editor: Editor) -> None:
-    """It goes with the image, and a name that is not there is told at its control."""
+    """It goes with the image, its thumbnail shows it, and a name that is not there is told at its control."""
     page = editor.page
+    thumbnail = "[data-field=base_color] .texture canvas"
     texels = np.zeros((4, 4, 6), np.float32)
     texels[..., 0], texels[..., 5] = 1, 1
     layers = written(texels, [f"{layer}.{channel}" for layer in ("AO", "beauty") for channel in "RGB"])
     editor.drop("#material-form [data-field=base_color]", {"layers.exr": layers})
     editor.wait("the texture", lambda: page.is_visible(BENEATH))
     before = editor.settled()
+    editor.wait("its picture, a blue one", lambda: int(np.argmax(painted(editor, thumbnail)[:3])) == 2)
     page.click(f"{BENEATH} > summary")
     layer = page.locator(f"{BENEATH} [data-field=layer] input")
     layer.fill("depth")
@@ -122,6 +124,7 @@ def test_a_layer_of_an_image_is_named(editor: Editor) -> None:
     editor.wait_for_change(before, 8)
     editor.wait("forgiveness", lambda: page.is_hidden(trouble))
     assert json.loads(editor.shot("#download-scene"))["textures"]["layers"]["layer"] == "AO"
+    editor.wait("the layer's, a red one", lambda: painted(editor, thumbnail)[0] > painted(editor, thumbnail)[2])
     editor.drop("#material-form [data-field=base_color]", {"halves.png": halves()})
     editor.wait("the other image", lambda: "halves" in editor.text("[data-field=base_color] .texture"))
     assert "layer" not in json.loads(editor.shot("#download-scene"))["textures"]["halves"]

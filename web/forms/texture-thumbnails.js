@@ -75,19 +75,22 @@ export class TextureThumbnails {
     );
   }
 
-  #bitmap(asset) {
-    if (!this.#bitmaps.has(asset)) {
+  // Of an image, perhaps of one of its layers, which no browser reads.
+  #bitmap(asset, layer) {
+    const key = layer === undefined ? asset : JSON.stringify([asset, layer]);
+    if (!this.#bitmaps.has(key)) {
       const made = this.#last.then(async () => {
         try {
+          if (layer !== undefined) return await rendered(this.black, { asset, layer });
           return await shrink(await fetchAsset(asset)).catch(() => rendered(this.black, { asset }));
         } catch {
           return null; // without a picture the name has to do
         }
       });
       this.#last = made;
-      this.#bitmaps.set(asset, made);
+      this.#bitmaps.set(key, made);
     }
-    return this.#bitmaps.get(asset);
+    return this.#bitmaps.get(key);
   }
 
   // Resolves to the texture's mean, linear [r, g, b, a]; of an image that the service cannot read 1. `reads` is "color" or
@@ -109,10 +112,10 @@ export class TextureThumbnails {
         );
       return this.#means.get(key);
     }
-    const { asset, color_space = reads === "color" ? undefined : "linear" } = texture;
-    const key = JSON.stringify([asset, color_space, reads === "a"]);
+    const { asset, layer, color_space = reads === "color" ? undefined : "linear" } = texture;
+    const key = JSON.stringify([asset, layer, color_space, reads === "a"]);
     if (!this.#means.has(key)) {
-      const image = { asset, ...(color_space ? { color_space } : {}) };
+      const image = { asset, ...(layer ? { layer } : {}), ...(color_space ? { color_space } : {}) };
       const made =
         reads === "a"
           ? meanOf(lit(this.black, image, { looks: OPACITY })).then(([opacity]) => [1, 1, 1, opacity])
@@ -142,13 +145,13 @@ export class TextureThumbnails {
   // A canvas that shows the texture, now or as soon as there is a picture of it.
   paint(canvas, texture, textures = {}) {
     const inner = inputOf(texture, textures);
-    const wanted = JSON.stringify(texture.type ? [texture, inner] : [texture.asset]);
+    const wanted = JSON.stringify(texture.type ? [texture, inner] : [texture.asset, texture.layer]);
     if (canvas.dataset.shown === wanted) return;
     Object.assign(canvas, { width: SIDE, height: SIDE });
     canvas.dataset.shown = wanted;
     const context = canvas.getContext("2d");
     if (texture.type === "checker") return drawChecker(context, texture);
-    const found = texture.type ? this.#computed(wanted, canvas, texture, inner) : this.#bitmap(texture.asset);
+    const found = texture.type ? this.#computed(wanted, canvas, texture, inner) : this.#bitmap(texture.asset, texture.layer);
     found.then((bitmap) => {
       if (bitmap && canvas.dataset.shown === wanted) drawImage(context, bitmap);
     });

@@ -61,7 +61,7 @@ def png_with_text(png: bytes, text: str) -> bytes:
     data = text.encode("ascii")
     long = len(data) > LONG_TEXT
     key = KEY.encode() + b"\0"
-    chunk = _chunk(b"zTXt", key + b"\0" + zlib.compress(data)) if long else _chunk(b"tEXt", key + data)
+    chunk = png_chunk(b"zTXt", key + b"\0" + zlib.compress(data)) if long else png_chunk(b"tEXt", key + data)
     header = len(PNG_MAGIC) + 25  # IHDR is always 25 bytes long
     return png[:header] + chunk + png[header:]
 
@@ -71,9 +71,9 @@ def png_with_encoding(png: bytes, codes: tuple[int, int] | None, profile: bytes 
     its colours."""
     chunks = b""
     if codes is not None:
-        chunks += _chunk(b"cICP", bytes([*codes, 0, 1]))  # RGB, full range
+        chunks += png_chunk(b"cICP", bytes([*codes, 0, 1]))  # RGB, full range
     if profile is not None:
-        chunks += _chunk(b"iCCP", b"ICC\0\0" + zlib.compress(profile))
+        chunks += png_chunk(b"iCCP", b"ICC\0\0" + zlib.compress(profile))
     header = len(PNG_MAGIC) + 25
     at, parts = header, [png[:header], chunks]
     while at + 12 <= len(png):
@@ -110,7 +110,7 @@ def _webp_text(data: bytes) -> bytes | None:
 _XMP = re.compile(rb'\bsunbox:(recipe|deflated)="([^"]*)"')
 
 
-def _chunk(kind: bytes, data: bytes) -> bytes:
+def png_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 

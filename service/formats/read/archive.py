@@ -9,7 +9,7 @@ import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from service.formats.errors import ParseError
 from service.formats.formats import decoded
@@ -27,6 +27,9 @@ UNICODE_NAME = 0x7075  # the kind of fact about an entry that is its name in UTF
 UNUSED_FOLDER = "__macosx"
 UNUSED_FILES = (".ds_store", "thumbs.db", "desktop.ini")
 UNUSED_START = "._"  # before the name of a file: what macOS knows of that file and other file systems cannot keep
+# Code pages in which Windows writes names in zips: of western, central and eastern Europe, Japan, China, Korea and
+# Taiwan.
+CODE_PAGES = ("cp850", "cp852", "cp866", "cp1251", "cp932", "gbk", "cp949", "cp950")
 ALIGNMENT = 64  # bytes; where each file of a USD package begins
 
 
@@ -48,7 +51,7 @@ class Archive:
         self.used: set[str] = set()  # names of the files that were read
         for entry in entries:
             _check(entry)
-            name, other = (posixpath.normpath(each) for each in _names(entry))
+            name, *spellings = (posixpath.normpath(each) for each in _names(entry))
             if _slashed(entry.filename).endswith("/") or _is_unused(name):
                 continue
             if (same := self._files.get(name)) is not None:
@@ -56,7 +59,7 @@ class Archive:
                     continue
                 raise ParseError(f"the zip has two files named {name[:100]!r}")
             self._files[name] = entry
-            others[other] = name
+            others |= {spelled: name for spelled in spellings if spelled not in others}
         total = sum(entry.file_size for entry in self._files.values())
         most = min(max_bytes, MOST_RATIO * len(data) + SLACK)
         if total > most:
@@ -128,7 +131,7 @@ def zipped(files: Mapping[str, bytes]) -> bytes:
     return out.getvalue()
 
 
-def _names(entry: zipfile.ZipInfo) -> tuple[str, str]:
+def _names(entry: zipfile.ZipInfo) -> list[str]:
     """The name of an entry, and what it is called where its bytes are read as another program may have written them.
 
     Many write UTF-8 without its flag, or the code page of their system; zips know only that of the first PCs. Some on
@@ -136,14 +139,22 @@ def _names(entry: zipfile.ZipInfo) -> tuple[str, str]:
     """
     name = _slashed(entry.filename)
     if entry.flag_bits & UTF_8:
-        return name, name
+        return [name]
     if (further := _unicode_name(entry)) is not None:
-        return further, further
-    data = name.encode("cp437")
+        return [further]
+    data = entry.filename.encode("cp437")
     try:
-        return data.decode(), data.decode()
+        return [_slashed(data.decode())]
     except UnicodeDecodeError:
-        return name, decoded(data)
+        return [name, *(_slashed(each) for each in (decoded(data), *_spellings(data)))]
+
+
+def _spellings(data: bytes) -> Iterator[str]:
+    for page in CODE_PAGES:
+        try:
+            yield data.decode(page)
+        except UnicodeDecodeError:
+            continue
 
 
 def _slashed(name: str) -> str:

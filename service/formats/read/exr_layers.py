@@ -43,6 +43,8 @@ def choose(file: Any, wanted: str = "") -> Choice:
     """The layer to show of a file that is open in OpenImageIO, which then stands at its part: the one of the name
     that is wanted, else the likeliest. Raises ParseError."""
     parts = list(_parts(file))
+    if not any(channels for _, channels in parts):
+        raise ParseError("deep images are not supported")
     layers = [layer for k, (name, channels) in enumerate(parts) for layer in _layers(k, name, channels, len(parts))]
     names = tuple(dict.fromkeys(layer.name for layer in layers))
     chosen, warnings = (_named(layers, wanted), ()) if wanted else _likeliest(layers, parts)
@@ -76,11 +78,11 @@ def _sampling(channels: bytes) -> Iterator[tuple[str, int, int]]:
 
 
 def _parts(file: Any) -> Iterator[tuple[str, list[str]]]:
-    """The name and the names of the channels of each part."""
+    """The name and the names of the channels of each part; of a deep one none, as no layer of it is shown."""
     part = 0
     while file.seek_subimage(part, 0):
         spec = file.spec()
-        yield spec.get_string_attribute("oiio:subimagename"), list(spec.channelnames)
+        yield spec.get_string_attribute("oiio:subimagename"), [] if spec.deep else list(spec.channelnames)
         part += 1
 
 

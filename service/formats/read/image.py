@@ -91,7 +91,7 @@ def _open(format: str, data: bytes, limits: AssetLimits) -> Any:
         image = opened(data, [PILLOW[format]])
     except UnidentifiedImageError:
         raise ParseError(f"it begins as {format.upper()} does, but can't be read") from None
-    check_size(*image.size, limits)
+    check_size(image.width, image.height, limits)
     return image
 
 
@@ -135,7 +135,8 @@ def _floats(format: str, data: bytes, limits: AssetLimits, layer: str) -> ImageD
     with _path(readable(data)) as path, _opened(format, path) as file:
         choice = choose(file, layer)
         spec = file.spec()
-        _check_plain(spec)
+        if spec.depth > 1:
+            raise ParseError("images with depth are not supported")
         check_size(spec.width, spec.height, limits)
         check_size(spec.full_width, spec.full_height, limits)
         names = choice.layer.channels
@@ -210,13 +211,6 @@ def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
             if len(window) == 16:
                 left, top, right, bottom = struct.unpack("<iiii", window)
                 check_size(right - left + 1, bottom - top + 1, limits)
-
-
-def _check_plain(spec: Any) -> None:
-    if spec.deep:
-        raise ParseError("deep images are not supported")
-    if spec.depth > 1:
-        raise ParseError("images with depth are not supported")
 
 
 def _rgb(pixels: Floats) -> Floats:

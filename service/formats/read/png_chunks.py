@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
-MAGIC = b"\x89PNG\r\n\x1a\n"
+from service.formats.images.metadata import PNG_MAGIC as MAGIC
+from service.formats.images.metadata import png_chunk
+
 END = b"IEND\xaeB`\x82"
 MOST_TEXT = 64 << 20  # bytes of texts when they are inflated: a picture of ours has its whole scene in one
 FRAMES = (b"fcTL", b"fdAT")  # of an animation; after the first picture they are not needed
@@ -42,7 +44,7 @@ def readable(data: bytes) -> bytes:
             continue
         if name == b"tRNS" and kind == b"\0" and bits in (b"\2", b"\4") and len(body) == 2:
             most = (1 << bits[0]) - 1
-            whole = _chunk(name, struct.pack(">H", (struct.unpack(">H", body)[0] & most) * (255 // most)))
+            whole = png_chunk(name, struct.pack(">H", (struct.unpack(">H", body)[0] & most) * (255 // most)))
         kept.append(whole)
     return b"".join(kept)
 
@@ -77,7 +79,3 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes, bytes]]:
 
 def _is_sound(whole: bytes) -> bool:
     return struct.pack(">I", zlib.crc32(whole[4:-4])) == whole[-4:]
-
-
-def _chunk(name: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))

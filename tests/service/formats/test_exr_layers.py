@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import struct
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
 from service.cli.program import main
+from service.formats.read.exr_layers import choose
 from service.problems import AssetError
 from service.server.assets import AssetStore
 from tests import asset_files as make
@@ -138,6 +141,44 @@ def test_luminance_and_chroma_of_every_pixel_are_a_picture(store: AssetStore) ->
     planes = np.stack([y, picture[..., 0] / y - 1, picture[..., 2] / y - 1], axis=2)
     pixels, warnings, _ = added(store, written(planes, ("Y", "RY", "BY")))
     assert np.allclose(pixels, picture, atol=1e-5) and warnings == []
+
+
+def deep_spec(name: str, channels: str, is_deep: bool = True) -> oiio.ImageSpec:
+    made = oiio.ImageSpec(2, 2, len(channels), "float")
+    made.channelnames, made.deep = list(channels), is_deep
+    made.attribute("oiio:subimagename", name)
+    return made
+
+
+@pytest.mark.parametrize("channels", ["RGBAZ", "AZ"])
+def test_a_deep_image_is_refused_as_such(store: AssetStore, channels: str) -> None:
+    points = oiio.DeepData()
+    points.init(4, len(channels), ["float"] * len(channels), list(channels))
+    with tempfile.NamedTemporaryFile(suffix=".exr") as made:
+        output = oiio.ImageOutput.create(made.name)
+        assert output.open(made.name, deep_spec("points", channels)) and output.write_deep_image(points)
+        output.close()
+        data = Path(made.name).read_bytes()
+    with pytest.raises(AssetError, match="deep images are not supported"):
+        store.add(data)
+
+
+def test_deep_parts_are_no_layers() -> None:
+    class File:
+        """Parts as OpenImageIO shows them, which writes none of both kinds together."""
+
+        parts = (deep_spec("points", "RGBAZ"), deep_spec("flat", "RGB", is_deep=False))
+        part = 0
+
+        def seek_subimage(self, part: int, level: int) -> bool:
+            self.part = part
+            return part < len(self.parts)
+
+        def spec(self) -> oiio.ImageSpec:
+            return self.parts[self.part]
+
+    choice = choose(File())
+    assert (choice.layer.part, choice.layer.channels, choice.warnings, choice.names) == (1, (0, 1, 2), (), ())
 
 
 def test_an_upload_is_answered_with_the_layers(server: Server) -> None:

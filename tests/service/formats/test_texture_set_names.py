@@ -102,7 +102,7 @@ def test_tiles_by_their_names(stem: str, material: str, tile: int | None) -> Non
 
 def test_a_number_is_no_tile_where_none_is_the_first() -> None:
     found = meaning("bricks_1050_color", tiles_within(["bricks_1050_color", "bricks_1050_rough"]))
-    assert found is not None and found.tile is None and found.material == "bricks"
+    assert found is not None and found.tile is None and found.material == "bricks_1050"
 
 
 def test_the_first_tile_is_shown_and_all_others_are_named(store: AssetStore) -> None:

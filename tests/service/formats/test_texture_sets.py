@@ -231,6 +231,8 @@ def test_a_zip_without_such_images_is_refused(store: AssetStore) -> None:
         store.add(zipped({"IMG_1.png": make.png(COLOR)}))
     with pytest.raises(AssetError, match=r"a_color\.png"):
         store.add(zipped({"a_color.png": make.png(COLOR)[:60], "a_rough.png": make.png(GREY)}))
+    with pytest.raises(AssetError, match=r"a_gloss\.png: the file is cut off"):
+        store.add(zipped({"a_color.png": make.png(COLOR), "a_gloss.png": make.png(GREY)[:60]}))
     with pytest.raises(NotFound, match="holds materials"):
         store.scene(store.add(zipped({"b_color.png": make.png(COLOR)})).id)
 
@@ -280,3 +282,20 @@ def test_the_command_writes_the_material_of_a_zip_or_a_folder(
     assert "holds materials and no shapes" in capsys.readouterr().err
     (empty := tmp_path / "empty").mkdir()
     assert main(["import", str(empty), "-o", str(tmp_path / "e.json")]) == 2
+
+
+@pytest.mark.parametrize("kind", ["png", "exr"])
+def test_images_of_more_than_8_bits_are_turned_as_well(store: AssetStore, kind: str) -> None:
+    """Gloss into roughness, and DirectX's normals, in 16 bits."""
+    values = np.random.default_rng(3).integers(0, 65536, (5, 7, 3), np.uint16)
+    data = make.png(values) if kind == "png" else make.exr((values / 65535).astype(np.float32))
+    document = store.materials(store.add(zipped({f"oak_nor_dx.{kind}": data, f"oak_gloss.{kind}": data})).id).document
+    normal, rough = (
+        store.image(document["textures"][document["materials"]["oak"][member]["texture"]]["asset"])
+        for member in ("normal_map", "roughness")
+    )
+    assert not normal.is_8bit and not rough.is_8bit
+    expected = values / 65535
+    assert np.abs(rough.pixels[..., 0] - (1 - expected[..., 0])).max() < 2e-5
+    expected[..., 1] = 1 - expected[..., 1]
+    assert np.abs(normal.pixels - expected).max() < 2e-5

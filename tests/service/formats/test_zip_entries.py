@@ -66,6 +66,20 @@ def test_a_name_that_is_written_once_more_in_utf_8(store: AssetStore) -> None:
     assert "'木.png' is not there" in str(other.warnings), "it belongs to a name that the entry had before"
 
 
+@pytest.mark.parametrize("library", ["utf-8", "the same"])
+@pytest.mark.parametrize(
+    ("page", "name"),
+    [("cp850", "grün"), ("cp1252", "grün"), ("cp866", "дерево"), ("cp1251", "дерево"), ("cp932", "木目表"),
+     ("gbk", "木纹"), ("cp949", "나무"), ("cp950", "木紋")],
+)  # fmt: skip
+def test_names_in_the_code_page_of_a_system(store: AssetStore, page: str, name: str, library: str) -> None:
+    """As Windows zips them; its programs write names in UTF-8 or in the same page."""
+    text = f"newmtl m\nmap_Kd tex/{name}.png\n".encode(page if library == "the same" else library)
+    raw = name.encode(page)
+    data = zipped({"a.obj": TEXTURED, "m.mtl": text, f"tex/{'#' * len(raw)}.png": OAK}, zipfile.ZIP_STORED)
+    assert shown(store, data.replace(b"#" * len(raw), raw)) == OAK
+
+
 def test_the_same_file_twice_is_one(store: AssetStore) -> None:
     files = [("a.obj", TEXTURED), ("m.mtl", "newmtl m\nmap_Kd oak.png\n"), ("oak.png", OAK), ("oak.png", OAK)]
     with pytest.warns(UserWarning, match="Duplicate"):

@@ -15,7 +15,6 @@ from service.formats.read.png_chunks import opened
 
 def pixels(textures: Textures, info: JsonView | None) -> Any:
     """The RGBA pixels of a texture's image; None where it has no image."""
-
     from service.formats.read.image import check_size
 
     source = textures.source(textures.file.follow(info, "index", "textures")) if info else None
@@ -23,7 +22,7 @@ def pixels(textures: Textures, info: JsonView | None) -> Any:
         return None
     try:
         image = opened(textures.data(source), ["PNG", "JPEG", "WEBP"])
-        check_size(*image.size, textures.file.limits)
+        check_size(image.width, image.height, textures.file.limits)
         return image.convert("RGBA")
     except (OSError, SyntaxError, ValueError):
         raise ParseError("is a broken image", source.pointer) from None

@@ -170,7 +170,6 @@ class Textures:
 
 def _channels(data: bytes, place: JsonView) -> str:
     """The channels of an image, from its header."""
-
     try:
         image = opened(data, [name.upper() for name in READ])
     except (OSError, SyntaxError, ValueError):

@@ -4,7 +4,6 @@ constant stays as it is; all else that differs from place to place is computed f
 
 from __future__ import annotations
 
-import io
 import math
 import posixpath
 from dataclasses import dataclass, field
@@ -203,9 +202,9 @@ class Values:
         is_color = tree.size >= 3 and kind != "normals"
         if is_color:
             document["color_space"] = "srgb"
-        stored: np.ndarray = srgb_bytes(texels[..., :3]) if is_color else texels[..., :3]
         is_fine = wanted == 16 and tree.size == 1
-        data = _png16(texels[..., 0]) if is_fine else encode(np.ascontiguousarray(stored), "png")
+        stored: np.ndarray = srgb_bytes(texels[..., :3]) if is_color else texels[..., : 1 if is_fine else 3]
+        data = encode(np.ascontiguousarray(stored), "png", bits=16 if is_fine else 8)
         asset = self.files.add(data, place)
         self._names[key] = self._named(place.rpartition("/")[2], {"asset": asset, **document})
         self._scales[self._names[key]] = [scale] * tree.size
@@ -273,15 +272,6 @@ class Values:
             bits = 16 if not images else bits
         width, height = max(sides, key=lambda side: side[0] * side[1])
         return min(width, MOST_SIDE), min(height, MOST_SIDE), bits
-
-
-def _png16(grey: Floats) -> bytes:
-    """A grey PNG of 16 bits, by Pillow: OpenImageIO writes to files only, which this process may not open."""
-    from PIL import Image
-
-    out = io.BytesIO()
-    Image.fromarray(np.asarray(np.round(grey * 65535), np.uint16)).save(out, "PNG", compress_level=1)
-    return out.getvalue()
 
 
 def _unplaced(uv: Floats, map: Map) -> Floats:

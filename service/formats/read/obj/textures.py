@@ -138,7 +138,6 @@ class Textures:
 
 def _opened(data: bytes, found: Map) -> Any:
     """An image whose header was read, and nothing else of it."""
-
     try:
         return opened(data, list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):

@@ -25,6 +25,12 @@ def turned(data: bytes, limits: AssetLimits) -> bytes:
     return _png(texels)
 
 
+def is_transparent(data: bytes, limits: AssetLimits) -> bool:
+    """True for an image with an alpha that is not 1 everywhere. Raises ParseError."""
+    texels = _texels(data, limits)
+    return texels.shape[2] == 4 and bool((texels[..., 3] < (255 if texels.dtype == np.uint8 else 1)).any())
+
+
 def place(texels: np.ndarray, channel: str) -> int:
     """The last axis' index of a channel; 0 for a grey image, or where there is no alpha."""
     at = CHANNELS.index(channel or "r")

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import posixpath
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.errors import ParseError
 from service.formats.formats import KINDS, OTHER_MODELS, UNREAD, sniff
 from service.formats.read.archive import Archive
+from service.formats.read.image import PILLOW
 from service.formats.read.obj.textures import FORMATS
+from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.texture_sets.baking import inverted, turned
+from service.formats.read.texture_sets.baking import inverted, is_transparent, turned
 from service.formats.read.texture_sets.names import FIRST_TILE, Role
 from service.formats.read.texture_sets.real_size import Size, by_names, by_note
 from service.formats.read.texture_sets.sets import UDIM, RoleImage, TextureSet, texture_sets
@@ -106,6 +110,28 @@ class _Textures:
         return self._names[key]
 
 
+@contextmanager
+def _at(path: str) -> Iterator[None]:
+    """Names the image that can't be read."""
+    try:
+        yield
+    except ParseError as error:
+        raise ParseError(error.detail, path[:100]) from None
+    except (OSError, SyntaxError, ValueError) as error:
+        raise ParseError(f"it can't be read ({str(error)[:100]})", path[:100]) from None
+
+
+def _without_alpha(data: bytes) -> bool:
+    """True for an image without transparency, whose alpha says nothing."""
+    if sniff(data) not in PILLOW:
+        return False
+    try:
+        image = opened(data, list(PILLOW.values()))
+    except (OSError, SyntaxError, ValueError):
+        return False  # it is refused as a part
+    return "A" not in image.getbands() and "transparency" not in image.info
+
+
 def _is_baked(source: RoleImage, role: Role) -> bool:
     return role == "gloss" or (role == "normal" and bool(source.meaning.directx))
 
@@ -113,9 +139,16 @@ def _is_baked(source: RoleImage, role: Role) -> bool:
 def _material(images: TextureSet, textures: _Textures, notes: Warnings) -> dict[str, Any]:
     out: dict[str, Any] = {"type": "principled"}
     for role, source in images.sources.items():
-        name = textures.use(source, role)
+        if source.channel == "a" and _without_alpha(textures.images[source.path]):
+            notes.add(source.path, f"it has no alpha channel, from which its {role} would be read")
+            continue
+        with _at(source.path):
+            name = textures.use(source, role)
+            is_cut_out = role == "color" and is_transparent(textures.images[source.path], textures.limits)
         if role == "color":
             out["base_color"] = {"texture": name}
+            if is_cut_out and "opacity" not in images.sources:
+                notes.add(source.path, "its alpha is left out: no image's name says that it is the opacity")
         elif role == "emission":
             out["emission"] = {"texture": name}
         elif role == "normal":

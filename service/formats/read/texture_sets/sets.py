@@ -7,13 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from service.formats.read.scenes.warnings import Warnings
-from service.formats.read.texture_sets.names import FIRST_TILE, Meaning, Role, meaning, tiles_within
+from service.formats.read.texture_sets.names import FILE_WORDS, FIRST_TILE, Meaning, Role, meaning, tiles_within
 
 # Things that no parameter has: they are left out, with a warning.
 LEFT_OUT: dict[Role, str] = {
     "occlusion": "ambient occlusion is left out: the light that reaches a corner is traced",
     "other": "there is no parameter for such an image; it is left out",
 }
+FOLDERS = ("textures", "texture", "tex", "maps", "map", "images", "image", "img")  # that any set may have
 UDIM = "UDIM tiles are not supported"
 
 
@@ -39,8 +40,8 @@ def texture_sets(paths: Iterable[str], notes: Warnings) -> dict[str, TextureSet]
     tiled = tiles_within(stems.values())
     named: dict[str, list[tuple[str, Meaning]]] = {}
     names: dict[str, str] = {}
-    for path, stem in stems.items():
-        found = meaning(stem, tiled)
+    meanings = _read(stems, tiled)
+    for path, found in meanings.items():
         if found is None:
             notes.add(path, "the file's name does not say what the image is of; it is left out")
         elif found.tile is not None and found.tile != FIRST_TILE:
@@ -55,14 +56,39 @@ def texture_sets(paths: Iterable[str], notes: Warnings) -> dict[str, TextureSet]
     return {name: each for name, each in sets.items() if each.sources}
 
 
+def _read(stems: dict[str, str], tiled: set[str]) -> dict[str, Meaning | None]:
+    """What each image is of. Another reading is right where all images of a material have one, and add something to
+    another material."""
+    found = {path: meaning(stem, tiled) for path, stem in stems.items()}
+    groups: dict[str, dict[str, Meaning]] = {}
+    for path, each in found.items():
+        if each is not None:
+            groups.setdefault(_plain(_material(path, each)), {})[path] = each
+    for images in groups.values():
+        others = {path: each.other for path, each in images.items() if each.other is not None}
+        wider = {_plain(_material(path, other)) for path, other in others.items()}
+        if len(others) < len(images) or len(wider) != 1 or (there := groups.get(wider.pop())) is None:
+            continue
+        taken = {role for each in there.values() for role in each.channels}
+        if not any(role in taken for other in others.values() for role in other.channels):
+            found |= others
+    return found
+
+
 def _plain(name: str) -> str:
     """A name without case and what parts its words, so that `Old Wood` and `old-wood` are one."""
     return "".join(letter for letter in name.casefold() if letter.isalnum()) or name
 
 
 def _material(path: str, found: Meaning) -> str:
-    """The name of its material: what is left of the file's name, else that of its folder."""
-    return found.material or posixpath.basename(posixpath.dirname(path)) or "material"
+    """The name of its material: what is left of the file's name, else that of the innermost folder whose name is not
+    one that any set may have."""
+    folders = [part for part in posixpath.dirname(path).split("/") if part and not _is_general(part)]
+    return found.material or (folders[-1] if folders else "material")
+
+
+def _is_general(folder: str) -> bool:
+    return folder.lower() in FOLDERS or FILE_WORDS.fullmatch(folder) is not None
 
 
 def _chosen(images: list[tuple[str, Meaning]], notes: Warnings) -> TextureSet:

@@ -204,7 +204,6 @@ def _space(picture: Picture, data: bytes, bands: str) -> str:
 
 def _bands(data: bytes, pointer: str) -> str:
     """The channels of an image as Pillow names them; RGB for formats of floats."""
-
     format = sniff(data)
     if format not in PILLOW:
         return "RGB"
