@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
@@ -87,14 +86,14 @@ class Textures:
         image = self._image(found)[1]
         if image is None or sniff(image) not in PILLOW:
             return False
-        opened = _opened(image, found)
+        opened = _opened(image)
         if len(opened.getbands()) < 3:
             return False
         check_size(opened.width, opened.height, self.limits)
         try:
             small = opened.convert("RGB").resize((SMALL, SMALL), Image.Resampling.BOX)
         except (OSError, SyntaxError, ValueError):
-            raise ParseError("is a broken image", found.place) from None
+            return False  # and the image is left out when it is stored
         red, green, blue = np.asarray(small, np.float64).reshape(-1, 3).mean(axis=0) / 255
         return bool(blue - max(red, green) > BLUE)
 
@@ -102,7 +101,7 @@ class Textures:
         image = self._image(found)[1]
         if image is None or sniff(image) not in PILLOW:
             return False
-        opened = _opened(image, found)
+        opened = _opened(image)
         return "A" in opened.getbands() or "transparency" in opened.info
 
     def _image(self, found: Map) -> tuple[str, bytes | None]:
@@ -123,6 +122,9 @@ class Textures:
             shown = repr(found.reference[:100])
             self.notes.add(found.place, f"the texture {shown} is not in a supported format ({FORMATS}); left out")
             return None
+        if format in PILLOW and _opened(data) is None:
+            self.notes.add(found.place, f"the texture {found.reference[:100]!r} is a broken image; left out")
+            return None
         return data
 
     def _note_options(self, found: Map) -> None:
@@ -136,10 +138,10 @@ class Textures:
             self.notes.add(found.place, "the option -mm is not supported and is ignored")
 
 
-def _opened(data: bytes, found: Map) -> Any:
-    """An image whose header was read, and nothing else of it."""
+def _opened(data: bytes) -> Any:
+    """An image whose header was read, and nothing else of it; None for one that is broken."""
 
     try:
         return opened(data, list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):
-        raise ParseError("is a broken image", found.place) from None
+        return None
