@@ -29,7 +29,7 @@ def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes
     may not be read."""
     from service.formats.read.archive import zipped
 
-    beside = _Neighbours(files)
+    beside = _Neighbours(files, path.name)
     found = _PARTS[format](data, beside)
     if found is None:
         return None
@@ -45,8 +45,8 @@ def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes
 class _Neighbours:
     """The files in the model's folder, and in other folders that were allowed."""
 
-    def __init__(self, files: FileAssets) -> None:
-        self.files = files
+    def __init__(self, files: FileAssets, model: str) -> None:
+        self.files, self.model = files, model
 
     def find(self, source: str, *spellings: str, place: str) -> str | None:
         """The path of the file that the file at `source` calls by one of these names. Both are relative to the
@@ -161,7 +161,7 @@ def _of_ply(data: bytes, beside: _Neighbours) -> list[str] | None:
     from service.formats.read.ply_header import read_header
 
     try:
-        names = read_header(memoryview(data)).textures
+        names = read_header(memoryview(data)).textures_of(beside.model)
     except ParseError:
         return None  # the importer reports the mistake
     return [path for name in names if (path := beside.find("", name, place="TextureFile")) is not None] or None
