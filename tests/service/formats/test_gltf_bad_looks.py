@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import struct
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from service.formats.errors import ParseError
 from service.formats.read.gltf.importer import read_scene
@@ -116,6 +119,29 @@ def test_a_camera(camera: dict[str, Any] | None) -> None:
     scene = read(file)
     assert scene.document["camera"]["vfov"] == pytest.approx(np.degrees(0.5))
     assert any("another camera of the file" in said for said in noted(scene).values())
+
+
+@pytest.mark.parametrize("format", ["BMP", "TGA", "GIF", "TIFF"])
+def test_images_that_gltf_does_not_allow(format: str) -> None:
+    made = io.BytesIO()
+    Image.new("RGB", (3, 2), (200, 100, 50)).save(made, format)
+    file = textured()
+    put(file, "images/0", {"bufferView": file.view(made.getvalue()), "mimeType": "image/png"})
+    scene = read(file)
+    (texture,) = scene.document["textures"].values()
+    part = scene.parts[int(texture["asset"].partition(":")[2])]
+    with Image.open(io.BytesIO(part.data)) as found:
+        assert found.format == "PNG" and found.size == (3, 2) and not scene.warnings
+
+
+@pytest.mark.parametrize("more", [-4, 4, 1000])
+def test_a_glb_of_a_wrong_length(more: int) -> None:
+    """Its chunks say what is there."""
+    data = textured().glb()
+    wrong = data[:8] + struct.pack("<I", len(data) + more) + data[12:]
+    assert len(read_scene(wrong, LIMITS).document["shapes"]) == 1
+    with pytest.raises(ParseError, match="the file is cut off"):
+        read_scene(wrong[:-5], LIMITS)
 
 
 @pytest.mark.parametrize("indexed", [True, False])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from service.config import Config
 from service.formats import AssetInfo
@@ -364,6 +365,17 @@ def test_broken_images_are_left_out(store: AssetStore, statement: str) -> None:
         info = store.add(zipped(files))
         assert not store.scene(info.id).document.get("textures") and info.warnings
         assert "left out" in str(info.warnings) and "p.png" in str(info.warnings)
+
+
+@pytest.mark.parametrize("format", ["BMP", "TGA", "GIF", "TIFF", "PCX"])
+def test_images_of_older_programs_are_textures(store: AssetStore, format: str) -> None:
+    made = io.BytesIO()
+    Image.new("RGB", (3, 2), (200, 100, 50)).save(made, format)
+    name = f"p.{format.lower()}"
+    files = {"a.obj": TEXTURED, "m.mtl": f"newmtl m\nmap_Kd {name}", name: made.getvalue()}
+    info = store.add(zipped(files))
+    (texture,) = store.scene(info.id).document["textures"].values()
+    assert store.image(texture["asset"]).pixels[0, 0].tolist() == [200, 100, 50] and not info.warnings
 
 
 def test_a_zip_of_many_entries_is_refused(store: AssetStore) -> None:

@@ -227,13 +227,13 @@ def _chunks(data: memoryview) -> tuple[memoryview, memoryview | None]:
     version, length, at = *struct.unpack_from("<II", data, 4), 12
     if version != 2:
         raise ParseError(f"glTF 2.0 is supported; this GLB is version {version}")
-    if length > len(data):
-        raise ParseError(f"the file is cut off: its header promises {length} bytes, there are {len(data)}")
     chunks: dict[int, memoryview] = {}
-    while at + 8 <= length:
+    while at + 8 <= min(length, len(data)):  # some exporters write a length that is a little too large or too small
         size, kind = struct.unpack_from("<II", data, at)
-        if at + 8 + size > length:
-            raise ParseError(f"the chunk at byte {at} promises {size} bytes, {length - at - 8} are left")
+        if at + 8 + size > len(data):
+            cut = f"its header promises {length} bytes, there are {len(data)}; " if length > len(data) else ""
+            left = f"the chunk at byte {at} promises {size} bytes, {len(data) - at - 8} are left"
+            raise ParseError(f"the file is cut off: {cut}{left}")
         chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     if JSON_CHUNK not in chunks:

@@ -13,6 +13,7 @@ from service.formats.read.gltf import ktx2_images
 from service.formats.read.gltf.document import REFUSALS, GltfDocument
 from service.formats.read.gltf.json_view import JsonView, number
 from service.formats.read.gltf.primitives import UV_SETS
+from service.formats.read.other_images import as_png
 from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
@@ -128,10 +129,14 @@ class Textures:
     def data(self, place: JsonView) -> bytes:
         """The bytes of an image in a format that is READ; those of any other as they are."""
         data = self.file.image(place)
-        if not data.startswith(ktx2_images.START):
+        if sniff(data) in READ:
             return data
         if place.pointer not in self._decoded:
-            self._decoded[place.pointer] = ktx2_images.as_png(data, self.file.limits, place.pointer)
+            if data.startswith(ktx2_images.START):
+                made = ktx2_images.as_png(data, self.file.limits, place.pointer)
+            else:
+                made = as_png(data, self.file.limits.max_texels) or data  # which glTF has not, and exporters write
+            self._decoded[place.pointer] = made
         return self._decoded[place.pointer]
 
     def _wrap(self, texture: JsonView) -> str | list[str]:

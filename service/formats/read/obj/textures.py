@@ -11,6 +11,7 @@ from service.formats.formats import KINDS, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
 from service.formats.read.obj.mtl import Map
+from service.formats.read.other_images import NAMED, as_png
 from service.formats.read.png_chunks import opened
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes.names import unique
@@ -20,7 +21,7 @@ from service.formats.types import AssetLimits
 
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # by -imfchan; any channel of a grey image is luminance
 PNG, SIXTEEN = b"\x89PNG\r\n\x1a\n", b"\x10"  # how a file begins, and the depth in its header
-FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
+FORMATS = f"PNG, JPEG, WebP, EXR, Radiance HDR, {NAMED}"
 SMALL = 64  # texels of a side are enough to tell a normal map from heights
 BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, at least; of heights it is 0
 
@@ -118,6 +119,9 @@ class Textures:
     def _read(self, path: str, found: Map) -> bytes | None:
         data = self.archive.read(path)
         format = sniff(data, filename=path) if data else None
+        if format is None and data:
+            data = as_png(data, self.limits.max_texels) or data
+            format = sniff(data)
         if format is None or KINDS[format] != "image":
             shown = repr(found.reference[:100])
             self.notes.add(found.place, f"the texture {shown} is not in a supported format ({FORMATS}); left out")
@@ -140,7 +144,6 @@ class Textures:
 
 def _opened(data: bytes) -> Any:
     """An image whose header was read, and nothing else of it; None for one that is broken."""
-
     try:
         return opened(data, list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):
