@@ -76,17 +76,14 @@ class _Neighbours:
 
 def _of_obj(data: bytes, beside: _Neighbours) -> list[str]:
     """Material libraries and the images that they name."""
-    from service.formats.read.obj.libraries import without_comment
+    from service.formats.read.obj.libraries import readings
     from service.formats.read.obj.mtl import read_mtl
     from service.formats.read.scenes.warnings import Warnings
 
     libraries: dict[str, None] = {}
     for statement in dict.fromkeys(MTLLIB.findall(text(data))):
-        named = decoded(statement).strip()
-        plain = without_comment(named)
-        wholes = (beside.find("", name, place="mtllib") for name in dict.fromkeys((named, plain)) if name)
-        whole = next((each for each in wholes if each), None)
-        names = [whole] if whole else [beside.find("", name, place="mtllib") for name in plain.split()]
+        known = readings(decoded(statement).strip(), lambda name: beside.find("", name, place="mtllib"))
+        names = [name for _, name in known]
         libraries |= {name: None for name in names if name is not None and not name.lower().endswith(".obj")}
     found = dict(libraries)
     for library in libraries:

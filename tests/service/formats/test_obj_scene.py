@@ -226,10 +226,12 @@ def test_a_library_that_is_not_there(store: AssetStore, library: str) -> None:
 
 def test_libraries_with_blanks_and_several_of_them(store: AssetStore) -> None:
     files = {"my m.mtl": "newmtl m\nKd 1 0 0", "b.mtl": "newmtl m\nKd 0 1 0\nnewmtl n\nKd 0 0 1"}
-    obj = BARE.replace("mtllib m.mtl", "mtllib my m.mtl\nmtllib b.mtl b.mtl") + "usemtl n\nf 1 2 3\n"
-    document, _, details = imported(store, {"a.obj": obj, **files})
-    assert [one["albedo"] for one in document["materials"].values()] == [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    assert not [said for said in details if "not there" in said]
+    for libraries in ("my m.mtl\nmtllib b.mtl b.mtl", "my m.mtl b.mtl", "b.mtl  my m.mtl  # two"):
+        obj = BARE.replace("m.mtl", libraries) + "usemtl n\nf 1 2 3\n"
+        document, _, details = imported(store, {"a.obj": obj, **files})
+        first = [0.0, 1.0, 0.0] if libraries.startswith("b") else [1.0, 0.0, 0.0]
+        assert [one["albedo"] for one in document["materials"].values()] == [first, [0.0, 0.0, 1.0]]
+        assert not [said for said in details if "not there" in said]
 
 
 WORDS = (
