@@ -35,7 +35,7 @@ def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes
     may not be read."""
     from service.formats.read.archive import zipped
 
-    beside = _Neighbours(files)
+    beside = _Neighbours(files, path.name)
     found = _PARTS[format](data, beside)
     if found is None:
         return None
@@ -51,8 +51,8 @@ def with_parts(path: Path, data: bytes, format: str, files: FileAssets) -> bytes
 class _Neighbours:
     """The files in the model's folder, and in other folders that were allowed."""
 
-    def __init__(self, files: FileAssets) -> None:
-        self.files = files
+    def __init__(self, files: FileAssets, model: str) -> None:
+        self.files, self.model = files, model
 
     def find(self, source: str, *spellings: str, place: str) -> str | None:
         """The path of the file that the file at `source` calls by one of these names. Both are relative to the
@@ -82,17 +82,14 @@ class _Neighbours:
 
 def _of_obj(data: bytes, beside: _Neighbours) -> list[str]:
     """Material libraries and the images that they name."""
-    from service.formats.read.obj.libraries import without_comment
+    from service.formats.read.obj.libraries import readings
     from service.formats.read.obj.mtl import read_mtl
     from service.formats.read.scenes.warnings import Warnings
 
     libraries: dict[str, None] = {}
     for statement in dict.fromkeys(MTLLIB.findall(text(data))):
-        named = decoded(statement).strip()
-        plain = without_comment(named)
-        wholes = (beside.find("", name, place="mtllib") for name in dict.fromkeys((named, plain)) if name)
-        whole = next((each for each in wholes if each), None)
-        names = [whole] if whole else [beside.find("", name, place="mtllib") for name in plain.split()]
+        known = readings(decoded(statement).strip(), lambda name: beside.find("", name, place="mtllib"))
+        names = [name for _, name in known]
         libraries |= {name: None for name in names if name is not None and not name.lower().endswith(".obj")}
     found = dict(libraries)
     for library in libraries:
@@ -169,7 +166,7 @@ def _of_ply(data: bytes, beside: _Neighbours) -> list[str] | None:
     from service.formats.read.ply_header import read_header
 
     try:
-        names = read_header(memoryview(data)).textures
+        names = read_header(memoryview(data)).textures_of(beside.model)
     except ParseError:
         return None  # the importer reports the mistake
     return [path for name in names if (path := beside.find("", name, place="TextureFile")) is not None] or None

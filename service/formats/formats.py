@@ -113,6 +113,11 @@ UNREADABLE = (
     (None, CAD_FILES, "this CAD format is not supported; export STEP from the program that wrote it"),
 )
 
+# What is sent instead of a file by mistake: a page that shows it, and what Git has for a file that is elsewhere.
+NO_FILE = re.compile(rb"\s*+(?:<!doctype html|<html|version https://git-lfs)", re.IGNORECASE)
+PAGE = "this is a web page, and not the file that it may show or lead to"
+POINTER = "this is a pointer of Git LFS, and not the file; `git lfs pull` fetches the file"
+
 # Endings of models in formats that are not read, which come in zips beside their textures.
 OTHER_MODELS = (
     ".3dm", ".abc", ".blend", ".c4d", ".iges", ".igs", ".lwo", ".ma", ".max", ".mb", ".skp", ".sldprt",
@@ -181,6 +186,8 @@ def decoded(data: bytes) -> str:
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
     """A key of KINDS, or None where the format is unknown."""
     head = data[:65536]
+    if NO_FILE.match(head):
+        return None
     for magic, name in MAGIC:
         if head.startswith(magic):
             return _package(head, data, filename) if name == "zip" else name
@@ -224,7 +231,9 @@ def _package(head: bytes, data: bytes | mmap, filename: str | None) -> str:
 
 
 def advice(head: bytes, filename: str | None) -> str | None:
-    """A sentence for a file of a program whose format cannot be read; None for any other."""
+    """A sentence for a file of a program whose format cannot be read, or what is no file; None for any other."""
+    if (found := NO_FILE.match(head)) is not None:
+        return PAGE if b"<" in found[0] else POINTER
     suffix = (filename or "").rpartition(".")[2].lower()
     for magic, suffixes, said in UNREADABLE:
         if suffix in suffixes or (magic is not None and head.startswith(magic)):

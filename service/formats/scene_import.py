@@ -11,8 +11,9 @@ from typing import Any
 from service.formats.types import Kind, Pose, SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument, NotFound
 
-IMPORTER = 10  # raised when files must be imported anew, because their documents or warnings change
+IMPORTER = 11  # raised when files must be imported anew, because their documents or warnings change
 PART = re.compile(r"part:(\d+)")
+LOST = "lost"  # stands for the id of an image that can't be read
 
 
 @dataclass(frozen=True)
@@ -73,15 +74,20 @@ class Imported:
 
 
 def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
-    """Store the parts of a scene by `store`, which returns their ids. Raises AssetError, and what `store` raises."""
+    """Store a scene's parts by `store`, which returns their ids. A model's images that can't be read are left out,
+    with warnings. Raises AssetError, and what `store` raises."""
     from service.document import parse_scene  # a quarter of a second, which each parsing child would wait for, too
 
     ids: list[str] = []
+    lost: list[dict[str, Any]] = []  # warnings about images
     for part in file.parts:
         try:
             ids.append(store(part))
         except AssetError as error:
-            raise AssetError(f"{part.pointer}: {error.detail}", part.pointer) from None
+            if part.triangles is not None or not file.document["shapes"]:
+                raise AssetError(f"{part.pointer}: {error.detail}", part.pointer) from None
+            lost.append({"pointer": part.pointer, "detail": f"{error.detail}; the image is left out"})
+            ids.append(LOST)
 
     def renamed(one: dict[str, Any]) -> dict[str, Any]:
         if "asset" not in one:  # a shape or an environment that is in the document itself
@@ -98,12 +104,37 @@ def take_apart(file: SceneFile, store: Callable[[ScenePart], str]) -> Imported:
     }
     if "environment" in document:
         document["environment"] = renamed(document["environment"])
+    if lost:
+        _leave_out(document)
     try:
         parse_scene(document)
     except InvalidDocument as error:
         raise AssetError(f"as a scene it has a mistake at {error.errors[0]}") from None
     animations = [asdict(each) for each in file.animations]
     return Imported(
-        document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER, file.variants, animations,
-        file.bounds,
+        document, [*file.warnings, *lost], file.lit, file.exposure, file.aspect_ratio, IMPORTER, file.variants,
+        animations, file.bounds,
     )  # fmt: skip
+
+
+def _leave_out(document: dict[str, Any]) -> None:
+    """Take the textures of lost images out of a document's materials, which show their factors instead, and a lost
+    environment."""
+    textures: dict[str, Any] = document["textures"]
+    gone = {name for name, texture in textures.items() if texture.get("asset") == LOST}
+    gone |= {name for name, texture in textures.items() if _shows(texture.get("input"), gone)}
+    document["textures"] = {name: texture for name, texture in textures.items() if name not in gone}
+    document["materials"] = {
+        name: {
+            field: value["factor"] if _shows(value, gone) else value
+            for field, value in material.items()
+            if not _shows(value, gone) or "factor" in value
+        }
+        for name, material in document.get("materials", {}).items()
+    }
+    if document.get("environment", {}).get("asset") == LOST:
+        del document["environment"]
+
+
+def _shows(value: Any, textures: set[str]) -> bool:
+    return isinstance(value, dict) and value.get("texture") in textures

@@ -36,8 +36,8 @@ def format_of(source: Source, content_type: str | None = None, filename: str | N
 def unreadable(source: Source, filename: str | None) -> str | None:
     """As `advice`."""
     if isinstance(source, bytes | memoryview):
-        return advice(bytes(source[:16]), filename)
-    return advice(os.pread(source.fileno(), 16, 0), filename)
+        return advice(bytes(source[:64]), filename)
+    return advice(os.pread(source.fileno(), 64, 0), filename)
 
 
 def for_sandbox(source: Source) -> bytes | int:

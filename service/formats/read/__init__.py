@@ -23,11 +23,12 @@ rendered     OpenEXR files that Sunbox wrote: colour, its variance and its sampl
 cube         tables of colours, one or three axes
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 png_chunks   the chunks of PNG: those that would refuse a sound picture, and what they say of colours
+other_images  images in formats of other programs as PNG
 exr_layers   the layers of an OpenEXR file, and which of them is shown
 exr_cube     OpenEXR files of six faces -> latitude-longitude images
 hdr_lines    Radiance HDR: flat scan lines and the older run lengths
 measured     measured reflection
-foreign      FBX, COLLADA, 3DS, X3D, 3MF and STEP by libraries that write glTF
+foreign      FBX, COLLADA, 3DS, X3D, 3MF and STEP as glTF
 usd          USD
 usd_names    the files that a USD layer names, found without its library
 materialx    MaterialX

@@ -102,8 +102,8 @@ def read_ply(data: memoryview) -> RawMesh:
     return found.mesh
 
 
-def read_textured_ply(data: memoryview) -> PlyMesh:
-    """Raises ParseError."""
+def read_textured_ply(data: memoryview, path: str = "") -> PlyMesh:
+    """The mesh of the file at this path. Raises ParseError."""
     header = read_header(data)
     body, told = Body(data, header), header.warnings
     vertex, declared = Table(), dict[str, str]()
@@ -138,7 +138,7 @@ def read_textured_ply(data: memoryview) -> PlyMesh:
     mesh = _mesh(vertices, faces, vertex.columns, declared, told)
     textures = np.zeros(len(faces.counts), np.int32) if faces.textures is None else faces.textures.astype(np.int32)
     textures[(textures < 0) | (textures >= len(header.textures))] = -1
-    return PlyMesh(mesh, np.repeat(textures, faces.counts - 2), header.textures)
+    return PlyMesh(mesh, np.repeat(textures, faces.counts - 2), header.textures_of(path))
 
 
 def _mesh(vertices: Doubles, faces: Faces, columns: Columns, declared: dict[str, str], told: list[str]) -> RawMesh:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from service.formats.errors import ParseError
-from service.formats.read.numbers import parsed
+from service.formats.read.numbers import number, parsed
 from service.formats.read.ply_header import Element, Header, count_of
 from service.formats.read.polygons import Longs
 
@@ -39,7 +39,8 @@ class Body:
         self.at = header.start
         self.unit = "byte"
         if header.encoding == "ascii":
-            self.data, self.at, self.unit = parsed(_without_end(bytes(data[header.start :]))).tobytes(), 0, "word"
+            text = _declared(_without_end(bytes(data[header.start :])), header)
+            self.data, self.at, self.unit = parsed(text).tobytes(), 0, "word"
             for p in (p for element in header.elements for p in element.properties):
                 p.dtype, p.count = "<f8", p.count and "<f8"
 
@@ -128,6 +129,34 @@ class Body:
                 f"the file is cut off: {element.length} rows of element {element.name} are promised, "
                 f"{len(self.data) - self.at} bytes are left"
             )
+
+
+def _declared(text: bytes, header: Header) -> bytes:
+    """The text, where each row has a line to itself, without words at the ends of lines that the header does not
+    declare: read on without lines they would be the next row's."""
+    if text.count(b"\n") + 1 != sum(element.length for element in header.elements):
+        return text
+    lines, start = text.split(b"\n"), 0
+    for element in header.elements:
+        end = start + element.length
+        first = lines[start].split() if element.length else []
+        if _words(element, first) < len(first):
+            rows = [line.split() for line in lines[start:end]]
+            lines[start:end] = [b" ".join(words[: _words(element, words)]) for words in rows]
+            header.warnings.append(
+                f"rows of element {element.name} have more numbers than the header declares; the last are not read"
+            )
+        start = end
+    return b"\n".join(lines)
+
+
+def _words(element: Element, words: list[bytes]) -> int:
+    """How many of a row's words the header declares."""
+    count = 0
+    for p in element.properties:
+        more = number(words[count]) if p.count and count < len(words) else 0.0
+        count += 1 + (int(more) if 0 <= more <= len(words) else 0)
+    return count
 
 
 def _without_end(text: bytes) -> bytes:

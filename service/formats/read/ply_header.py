@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from posixpath import basename, splitext
 
 import numpy as np
 
@@ -20,6 +21,7 @@ HEADER_BYTES = 1 << 20
 ENCODINGS = {"ascii": "ascii", "binary_little_endian": "<", "binary_big_endian": ">"}
 FIRST_LINE = re.compile(rb"(?:\xef\xbb\xbf)?ply[ \t]*+(\r\n|\n|\r)")
 LAYOUT = ("format", "element", "property")  # keywords of lines without which the data can't be found
+THIS = "<this>"
 AGAIN = " (again)"  # after the name of a property that has one's name
 
 
@@ -62,6 +64,10 @@ class Header:
     start: int = 0  # of the data
     textures: list[str] = field(default_factory=list)  # files that comments name
     warnings: list[str] = field(default_factory=list)
+
+    def textures_of(self, path: str) -> list[str]:
+        """The textures of a file at this path, for whose name MeshLab writes THIS."""
+        return [name.replace(THIS, splitext(basename(path))[0]) for name in self.textures]
 
 
 def count_of(p: Property) -> str:

@@ -66,7 +66,7 @@ def _read_binary(view: memoryview, told: list[str]) -> tuple[Numbers, Floats | N
     elif len(view) < promised and _holds_facets(view, there):
         told.append(f"the file is cut off: of {count} triangles that its header promises, {there} are whole and read")
         count, promised = there, len(view)
-    elif len(view) < promised or not count:
+    elif len(view) < promised or (not count and len(view) > promised):
         raise ParseError(
             f"not an STL file: {len(view)} bytes; its header promises {promised}, and it is no text of solids"
         )

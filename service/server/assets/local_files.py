@@ -141,7 +141,7 @@ class FileAssets:
 
 def _exists(path: Path) -> bool:
     try:
-        return path.exists()
+        return path.exists() and not path.is_dir()
     except OSError:  # a name too long
         return False
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from service.config import Config
-from service.problems import AssetError
+from service.problems import AssetError, UnsupportedMedia
 from service.server.assets import AssetStore
 from tests import asset_files as make
 from tests.asset_files import OBJ
@@ -218,7 +218,7 @@ REFUSED: dict[str, tuple[str, bytes, str]] = {
     "PNG lying about its size": ("x.png", make.png(BYTES, 2000, 2000), "can't be read as PNG"),
     "PNG of 16 bits cut": ("x.png", make.png(BYTES.astype(np.uint16))[:80], "PNG|read"),
     "PNG of 16 bits, a bomb": ("x.png", make.png(BYTES.astype(np.uint16), 60000, 60000), "texels; 1 to|PNG"),
-    "text as PNG": ("x.png", b"<html></html>", "not a PNG file: it begins with b'<html>"),
+    "text as PNG": ("x.png", b"hello world", "not a PNG file: it begins with b'hello"),
     "WebP cut": ("x.webp", b"RIFF\x24\0\0\0WEBPVP8 " + bytes(10), "WEBP"),
     "JPEG cut": ("x.jpg", b"\xff\xd8\xff\xe0\0\x10JFIF\0", "JPEG"),
 }
@@ -236,6 +236,20 @@ def test_refused(store: AssetStore, case: str) -> None:
     status = Path(f"/proc/{child.process.pid}/status").read_text()
     peak = re.search(r"VmHWM:\s+(\d+) kB", status)
     assert peak is not None and int(peak[1]) < MEGABYTES << 10
+
+
+@pytest.mark.parametrize("name", ["m.glb", "m.stl", "m.obj", "x.png", "m.fbx"])
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"\n<!DOCTYPE html>\n<html><body>", "this is a web page"),
+        (b"<html>" + b"x" * 500, "this is a web page"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 4\n", "this is a pointer of Git LFS"),
+    ],
+)
+def test_what_was_sent_instead_of_a_file(store: AssetStore, name: str, data: bytes, reason: str) -> None:
+    with pytest.raises(UnsupportedMedia, match=reason):
+        store.add(data, filename=name)
 
 
 def test_the_child_outlived_them_all(store: AssetStore) -> None:

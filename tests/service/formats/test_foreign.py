@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,15 @@ def test_3mf_is_in_metres_with_z_up_and_in_srgb(sandbox: Sandbox, unit: str | No
     assert bounds(scene) == pytest.approx(np.array([[0, 0, -10], [10, 20, 0]]) * metres, rel=1e-5, abs=1e-12)
     (found,) = scene.document["materials"].values()
     assert found["base_color"] == pytest.approx([0.5029, 0, 0], abs=2e-3)
+
+
+@pytest.mark.models
+def test_a_scene_without_meshes_is_refused(sandbox: Sandbox) -> None:
+    """Assimp makes a mesh of the nodes' places then."""
+    data = re.sub(rb"<library_geometries>.*</library_geometries>", b"", dae(), flags=re.DOTALL)
+    data = re.sub(rb"<instance_geometry.*</instance_geometry>", b"", data, flags=re.DOTALL)
+    with pytest.raises(ParseError, match="the scene has no triangles"):
+        sandbox.parse_scene("dae", data)
 
 
 @pytest.mark.models

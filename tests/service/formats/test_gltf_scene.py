@@ -13,7 +13,6 @@ from service.document import parse_scene
 from service.formats import MeshData, scene_import
 from service.pack import pack
 from service.pack.geometry import instances
-from service.problems import AssetError
 from service.server.assets import AssetStore
 from tests.gltf_files import QUAD, QUAD_FACES, QUAD_UVS, Gltf
 from tests.service.formats.scenes import corners, imported, noted
@@ -301,13 +300,19 @@ def test_a_document_outlives_its_parts(store: AssetStore) -> None:
     assert isinstance(store.mesh(part), MeshData)
 
 
-def test_a_broken_image_is_named(store: AssetStore) -> None:
+def test_a_broken_image_is_named_and_left_out(store: AssetStore) -> None:
+    """The factors of what it coloured remain, and other textures."""
     file = Gltf()
     image = file.add("images", {"bufferView": file.view(b"\x89PNG\r\n\x1a\n" + bytes(50))})
-    file.of({"pbrMetallicRoughness": {"baseColorTexture": {"index": file.add("textures", {"source": image})}}})
-    with pytest.raises(AssetError, match=r"^/images/0: ") as refusal:
-        store.add(file.glb())
-    assert refusal.value.place == "/images/0"
+    broken, sound = file.add("textures", {"source": image}), file.texture(np.full((2, 2, 3), 9, np.uint8))
+    rough = {"baseColorTexture": {"index": broken}, "baseColorFactor": [0.5, 1, 1, 1]}
+    rough["metallicRoughnessTexture"] = {"index": sound}
+    file.of({"normalTexture": {"index": broken}, "pbrMetallicRoughness": rough})
+    found = imported(store, file)
+    (material,) = found.document["materials"].values()
+    assert material["base_color"] == [0.5, 1, 1] and "normal_map" not in material
+    assert len(found.document["textures"]) == 1 and material["roughness"]["texture"] in found.document["textures"]
+    assert noted(found)["/images/0"].endswith("; the image is left out")
 
 
 def test_what_an_older_importer_made_is_made_anew(store: AssetStore, monkeypatch: pytest.MonkeyPatch) -> None:

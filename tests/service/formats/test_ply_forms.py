@@ -215,6 +215,13 @@ def test_a_zip_with_its_texture_is_a_scene() -> None:
     assert without.triangles == 2 and "the texture 'my oak.png' is not there" in without.warnings[0]["detail"]
 
 
+def test_a_texture_named_after_its_file() -> None:
+    """MeshLab's `<this>` stands for the name of the PLY file."""
+    text = TEXTURED.replace("my oak.png", "<this>_oak.png")
+    scene = read_zip(memoryview(zipped({"m/a.b.ply": text, "m/a.b_oak.png": OAK})), AssetLimits())
+    assert list(scene.document["materials"]) == ["a.b_oak.png"] and not scene.warnings
+
+
 def test_textures_by_number() -> None:
     two = TEXTURED.replace("comment TextureFile", "comment TextureFile a.png\ncomment TextureFile", 1)
     two = two.replace("float texcoord\n", "float texcoord\nproperty int texnumber\n")
@@ -224,12 +231,13 @@ def test_textures_by_number() -> None:
     assert sorted(scene.document["materials"]) == ["default", "my oak.png"]
 
 
+@pytest.mark.parametrize(("named", "file"), [("my oak", "my oak.png"), ("<this> oak", "a oak.png")])
 def test_the_command_line_takes_the_texture_along(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    named: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("SUNBOX_DATA_DIR", str(tmp_path / "data"))
-    (tmp_path / "a.ply").write_text(TEXTURED)
-    (tmp_path / "my oak.png").write_bytes(OAK)
+    (tmp_path / "a.ply").write_text(TEXTURED.replace("my oak", named))
+    (tmp_path / file).write_bytes(OAK)
     assert main(["import", str(tmp_path / "a.ply"), "-o", str(tmp_path / "a.json")]) == 0
     assert len(list((tmp_path / "a.assets").glob("*.png"))) == 1 and not capsys.readouterr().err
 
@@ -278,6 +286,21 @@ def test_a_property_named_twice_is_read_once() -> None:
     mesh = parsed(text.encode())
     assert mesh.vertices.tolist() == VERTICES
     assert mesh.warnings == ("element vertex has several properties named 'x'; the first is read",)
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_rows_with_more_numbers_than_the_header_declares(ending: str) -> None:
+    """As MeshLab writes colours of corners, and exporters an alpha: each row has a line."""
+    faces = "3 0 1 2 6 0 0 1 0 0 1 9 1 1 1\n4 0 1 3 2 8 0 0 1 0 1 1 0 1 9 1 1 1\n"
+    lines = ("element face 2", FACE, "property list uchar float texcoord")
+    mesh = parsed((header(*lines) + BODY.replace("\n", " 255\n") + faces).replace("\n", ending).encode())
+    assert mesh.uvs is not None
+    assert np.allclose(mesh.vertices[mesh.faces][:, 0], [VERTICES[0]] * 3) and len(mesh.faces) == 3
+    assert np.allclose(mesh.uvs[mesh.faces][0], [(0, 0), (1, 0), (0, 1)])
+    assert mesh.warnings == tuple(
+        f"rows of element {name} have more numbers than the header declares; the last are not read"
+        for name in ("vertex", "face")
+    )
 
 
 def test_what_is_not_read_is_told() -> None:

@@ -84,6 +84,12 @@ def test_what_is_no_stl_file_is_refused(data: bytes) -> None:
         parsed(data)
 
 
+@pytest.mark.parametrize("data", [bytes(84), b"solid x\nendsolid x\n"])
+def test_no_triangles(data: bytes) -> None:
+    with pytest.raises(ParseError, match="it has no faces"):
+        parsed(data)
+
+
 RED, GREEN, GREY = 31, 31 << 5, 16 | 16 << 5 | 16 << 10
 BODY = b"by Magics COLOR=\xff\x00\x00\xff,MATERIAL="
 

@@ -23,6 +23,7 @@ from service.formats.read.foreign.glb import Find, Glb
 JOIN_IDENTICAL_VERTICES, TRIANGULATE, SORT_BY_PRIMITIVE_TYPE = 0x2, 0x8, 0x8000
 GLOBAL_SCALE = 0x8000000  # to metres, by the unit that an FBX file says
 STEPS = JOIN_IDENTICAL_VERTICES | TRIANGULATE | SORT_BY_PRIMITIVE_TYPE | GLOBAL_SCALE
+INCOMPLETE = 0x1  # a flag of a scene without meshes, for whose nodes some readers invent one
 KEEP_PIVOTS = b"IMPORT_FBX_PRESERVE_PIVOTS"  # 0: a node's transform is one matrix, not a chain of nodes
 
 DIRECTIONAL, POINT, SPOT = 1, 2, 3  # of aiLightSourceType
@@ -129,7 +130,7 @@ def converted(format: str, data: bytes, find: Find) -> Glb:
     scene = library.aiImportFileFromMemoryWithProperties(data, len(data), STEPS, format.encode(), properties)
     if not scene:
         raise ParseError(f"it can't be read: {_reason(library)}")
-    if not scene.contents.mesh_count:
+    if not scene.contents.mesh_count or scene.contents.flags & INCOMPLETE:
         raise NoTriangles("the scene has no triangles: none of its nodes has a mesh that can be read")
     blob = library.aiExportSceneToBlob(scene, b"glb2", 0)
     if not blob:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import json
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
+
+from service.formats.read.other_images import as_png
+from service.formats.types import AssetLimits
 
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 AS_THEY_ARE = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")  # PNG and JPEG, which glTF has; others become PNG
@@ -122,17 +124,7 @@ def _as_glTF_has_it(data: bytes) -> bytes | None:
     """A PNG or a JPEG; None for what is no image."""
     if data.startswith(AS_THEY_ARE):
         return data
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(data)) as opened:
-            made = io.BytesIO()
-            opened.convert("RGBA" if "A" in opened.getbands() or "transparency" in opened.info else "RGB").save(
-                made, "PNG", compress_level=1
-            )
-            return made.getvalue()
-    except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
-        return None
+    return as_png(data, AssetLimits.max_texels)
 
 
 def _without(place: dict[str, Any], gone: set[int]) -> None:

@@ -14,7 +14,7 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
-from service.formats.errors import ParseError
+from service.formats.errors import MissingExtra, ParseError
 from service.formats.read.gltf import meshopt_views
 from service.formats.read.gltf.beside import Beside
 from service.formats.read.gltf.extensions import check_required
@@ -28,6 +28,13 @@ MOST_ITEMS = 1 << 20  # items of one kind, which bounds the time to read an untr
 
 Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
+
+
+class OtherFile(ParseError):
+    """A file that came alone names another."""
+
+
+REFUSALS = (OtherFile, MissingExtra)  # with which no part of a file is left out
 
 
 class GltfDocument:
@@ -124,7 +131,8 @@ class GltfDocument:
             return _embedded(uri[start.end() :], place)
         if self._beside is None:
             how = "upload a zip of the model and its files, or save the model as a GLB"
-            raise place.error("uri", f"refers to another file, {shown(uri)}, which is not part of this one; {how}")
+            detail = f"refers to another file, {shown(uri)}, which is not part of this one; {how}"
+            raise OtherFile(detail, place.at("uri"))
         found = self._beside.find(uri)
         if found is None:
             raise place.error("uri", f"refers to {shown(uri)}, which is not there: {self._beside.shown}")
@@ -219,13 +227,13 @@ def _chunks(data: memoryview) -> tuple[memoryview, memoryview | None]:
     version, length, at = *struct.unpack_from("<II", data, 4), 12
     if version != 2:
         raise ParseError(f"glTF 2.0 is supported; this GLB is version {version}")
-    if length > len(data):
-        raise ParseError(f"the file is cut off: its header promises {length} bytes, there are {len(data)}")
     chunks: dict[int, memoryview] = {}
-    while at + 8 <= length:
+    while at + 8 <= min(length, len(data)):  # some exporters write a length that is a little too large or too small
         size, kind = struct.unpack_from("<II", data, at)
-        if at + 8 + size > length:
-            raise ParseError(f"the chunk at byte {at} promises {size} bytes, {length - at - 8} are left")
+        if at + 8 + size > len(data):
+            cut = f"its header promises {length} bytes, there are {len(data)}; " if length > len(data) else ""
+            left = f"the chunk at byte {at} promises {size} bytes, {len(data) - at - 8} are left"
+            raise ParseError(f"the file is cut off: {cut}{left}")
         chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     if JSON_CHUNK not in chunks:

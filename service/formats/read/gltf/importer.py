@@ -141,7 +141,7 @@ class _Importer:
 
     def _asked(self, primitive: Primitive, place: JsonView) -> Primitive:
         """The primitive without tangents and without its colours' alpha, where its material does not use them."""
-        material = self.file.follow(place, "material", "materials") if "material" in place else JsonView({}, "")
+        material = self.materials.place(place)
         coat = material.extension("KHR_materials_clearcoat")
         bent = "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
         directed = bent or material.extension("KHR_materials_anisotropy") is not None

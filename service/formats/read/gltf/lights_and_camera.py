@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from service.formats.errors import ParseError
 from service.formats.read.gltf.document import GltfDocument
 from service.formats.read.gltf.json_view import JsonView, shown
 from service.formats.read.gltf.nodes import Node
 from service.formats.read.scenes.framing import FRAMED_VFOV, Bounds
 from service.formats.read.scenes.warnings import Warnings
 
-INSTEAD = "a perspective camera that shows the whole scene is used instead"
+INSTEAD = "another camera of the file, or one that shows the whole scene, is used instead"
 
 
 def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[str, Any]]:
@@ -21,17 +22,24 @@ def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[
     metre."""
     found = []
     for node in nodes:
-        used = node.place.extension("KHR_lights_punctual")
-        if used is None:
+        try:
+            used = node.place.extension("KHR_lights_punctual")
+            light = None if used is None else _light(_listed(file, used), node, notes)
+        except ParseError as error:
+            notes.add(error.pointer, f"{error.detail}; the light is left out")
             continue
-        extension = file.root.extension("KHR_lights_punctual")
-        listed = extension.array("lights") if extension else []
-        index = used.whole("light")
-        if extension is None or index >= len(listed):
-            raise used.error("light", f"refers to light {index} of {len(listed)}")
-        light = _light(JsonView(listed[index], f"{extension.at('lights')}/{index}"), node, notes)
-        found.append({"name": node.path, **light} if node.path else light)
+        if light is not None:
+            found.append({"name": node.path, **light} if node.path else light)
     return found
+
+
+def _listed(file: GltfDocument, used: JsonView) -> JsonView:
+    extension = file.root.extension("KHR_lights_punctual")
+    listed = extension.array("lights") if extension else []
+    index = used.whole("light")
+    if extension is None or index >= len(listed):
+        raise used.error("light", f"refers to light {index} of {len(listed)}")
+    return JsonView(listed[index], f"{extension.at('lights')}/{index}")
 
 
 def _light(place: JsonView, node: Node, notes: Warnings) -> dict[str, Any]:
@@ -69,23 +77,30 @@ def camera(
     for node in nodes:
         if "camera" not in node.place:
             continue
-        place = file.follow(node.place, "camera", "cameras")
-        kind = place.text("type")
         if chosen is not None:
             notes.add(node.place.at("camera"), "this camera is not used; the scene's first camera is used instead")
-        elif kind == "perspective":
-            lens = place.need("perspective")
-            vfov = math.degrees(lens.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
-            chosen = _placed(node, bounds) | {"vfov": vfov}
-            aspect = lens.number("aspectRatio", 1, 1e-6, 1e6) if "aspectRatio" in lens else None
-        elif kind == "orthographic":
-            lens = place.need("orthographic")
-            width, height = (lens.number(name, 1, 1e-9, 1e9) for name in ("xmag", "ymag"))
-            chosen = _placed(node, bounds) | {"type": "orthographic", "height": 2 * height}
-            aspect = width / height if width != height else None  # 1:1 stands for any
-        else:
-            notes.add(place.at("type"), f"must be perspective or orthographic, not {shown(kind)}; {INSTEAD}")
+            continue
+        try:
+            lens, aspect = _lens(file.follow(node.place, "camera", "cameras"))
+            chosen = _placed(node, bounds) | lens
+        except ParseError as error:
+            notes.add(error.pointer, f"{error.detail}; {INSTEAD}")
     return chosen, aspect
+
+
+def _lens(place: JsonView) -> tuple[dict[str, Any], float | None]:
+    """What a camera's document says of its lens, and the width of its picture over the height."""
+    kind = place.text("type")
+    if kind == "perspective":
+        lens = place.need("perspective")
+        vfov = math.degrees(lens.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
+        return {"vfov": vfov}, lens.number("aspectRatio", 1, 1e-6, 1e6) if "aspectRatio" in lens else None
+    if kind == "orthographic":
+        lens = place.need("orthographic")
+        width, height = (lens.number(name, 1, 1e-9, 1e9) for name in ("xmag", "ymag"))
+        # 1:1 stands for any
+        return {"type": "orthographic", "height": 2 * height}, width / height if width != height else None
+    raise place.error("type", f"must be perspective or orthographic, not {shown(kind)}")
 
 
 def _placed(node: Node, bounds: Bounds) -> dict[str, Any]:

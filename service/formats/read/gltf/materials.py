@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.formats.read.gltf.document import GltfDocument
+from service.formats.errors import ParseError
+from service.formats.read.gltf.document import REFUSALS, GltfDocument
 from service.formats.read.gltf.json_view import JsonView
 from service.formats.read.gltf.material_inputs import MaterialInputs
 from service.formats.read.gltf.material_reader import MaterialReader
@@ -20,6 +21,8 @@ OTHER_HUES = (
     "the film's colours are those of its exact interfaces; programs that use Khronos' approximation show other hues, "
     "most of all on metals"
 )
+GREY = "a grey material is shown in its place"
+PLAIN = {"type": "diffuse", "albedo": 0.8}
 
 
 class Materials:
@@ -33,14 +36,19 @@ class Materials:
 
     def name(self, primitive: JsonView, charts: Charts) -> tuple[str, JsonView]:
         """The document's name for a primitive's material, and the material."""
-        given = "material" in primitive
-        place = self.file.follow(primitive, "material", "materials") if given else JsonView({}, "")  # all defaults
+        place = self.place(primitive)
         attributes = primitive.need("attributes")
         directed = charts[0] or ("TANGENT" in attributes and "NORMAL" in attributes)
         read = MaterialReader(place, self.textures, charts, directed, self.notes)
         key = place.pointer, charts, directed
         if key not in self._names:
-            document = self._document(read)
+            try:
+                document = self._document(read)
+            except REFUSALS:
+                raise
+            except ParseError as error:
+                self.notes.add(error.pointer, f"{error.detail}; {GREY}")
+                document = dict(PLAIN)
             called = place.text("name") or place.pointer[1:].replace("/", " ") or "default"
             same = self._called.setdefault(called, [])  # a file has one material twice where its sides differ
             found = next((name for name in same if self.documents[name] == document), None)
@@ -50,6 +58,15 @@ class Materials:
                 same.append(found)
             self._names[key] = found
         return self._names[key], place
+
+    def place(self, primitive: JsonView) -> JsonView:
+        """The material of a primitive; where it names none, or one that does not exist, one that is all defaults."""
+        if "material" in primitive:
+            try:
+                return self.file.follow(primitive, "material", "materials")
+            except ParseError as error:
+                self.notes.add(error.pointer, f"{error.detail}; {GREY}")
+        return JsonView({}, "")
 
     def _document(self, read: MaterialReader) -> dict[str, Any]:
         glossy = read.owner(GLOSSY)

@@ -109,6 +109,10 @@ def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Prim
     if "POSITION" not in attributes:
         notes.leave_out(place.pointer, "the primitive has no POSITION and is left out")
         return None
+    used = [(attributes, "POSITION"), *([(place, "indices")] if "indices" in place else [])]
+    if any(file.follow(owner, name, "accessors").value.get("count") == 0 for owner, name in used):
+        notes.leave_out(place.pointer, "the primitive has no triangles and is left out")
+        return None
     compressed = place.extension("KHR_draco_mesh_compression")
     packed, faces = draco.decode(file, compressed, attributes) if compressed else ({}, None)
     rows = _rows(file, attributes, packed, notes)

@@ -10,9 +10,10 @@ from typing import Any, Literal
 from service.formats.errors import ParseError
 from service.formats.formats import sniff
 from service.formats.read.gltf import ktx2_images
-from service.formats.read.gltf.document import GltfDocument
+from service.formats.read.gltf.document import REFUSALS, GltfDocument
 from service.formats.read.gltf.json_view import JsonView, number
 from service.formats.read.gltf.primitives import UV_SETS
+from service.formats.read.other_images import as_png
 from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.warnings import Warnings
@@ -43,6 +44,15 @@ class Textures:
         """The name of a texture; None, with a warning, where it cannot be used. `charts`: the uv sets of the mesh."""
         if info is None:
             return None
+        try:
+            return self._used(info, space, charts)
+        except REFUSALS:
+            raise
+        except ParseError as error:
+            self.notes.add(error.pointer or info.pointer, f"{error.detail}; the texture is left out")
+            return None
+
+    def _used(self, info: JsonView, space: ColorSpace, charts: Charts) -> str | None:
         texture = self.file.follow(info, "index", "textures")
         image = self.image(texture)
         placing = self._placing(info)
@@ -103,20 +113,30 @@ class Textures:
 
     def channels(self, info: JsonView) -> str:
         """The channels of a texture's image: "L" (grey), "RGB" and "A" joined; "" where no image can be read."""
-        place = self.source(self.file.follow(info, "index", "textures"))
-        if place is None:
+        try:
+            place = self.source(self.file.follow(info, "index", "textures"))
+            if place is None:
+                return ""
+            if place.pointer not in self._channels:
+                self._channels[place.pointer] = _channels(self.data(place), place)
+        except REFUSALS:
+            raise
+        except ParseError as error:
+            self.notes.add(error.pointer or info.pointer, f"{error.detail}; the texture is left out")
             return ""
-        if place.pointer not in self._channels:
-            self._channels[place.pointer] = _channels(self.data(place), place)
         return self._channels[place.pointer]
 
     def data(self, place: JsonView) -> bytes:
         """The bytes of an image in a format that is READ; those of any other as they are."""
         data = self.file.image(place)
-        if not data.startswith(ktx2_images.START):
+        if sniff(data) in READ:
             return data
         if place.pointer not in self._decoded:
-            self._decoded[place.pointer] = ktx2_images.as_png(data, self.file.limits, place.pointer)
+            if data.startswith(ktx2_images.START):
+                made = ktx2_images.as_png(data, self.file.limits, place.pointer)
+            else:
+                made = as_png(data, self.file.limits.max_texels) or data  # which glTF has not, and exporters write
+            self._decoded[place.pointer] = made
         return self._decoded[place.pointer]
 
     def _wrap(self, texture: JsonView) -> str | list[str]:

@@ -47,7 +47,7 @@ def read_obj_scene(archive: Archive, path: str, limits: AssetLimits) -> SceneFil
 
 def read_ply_scene(archive: Archive, path: str, limits: AssetLimits) -> SceneFile:
     """The scene of the PLY file at this path of a zip, whose comments name its textures. Raises ParseError."""
-    found = read_textured_ply(memoryview(archive.read(path)))
+    found = read_textured_ply(memoryview(archive.read(path)), path)
     place = path.rpartition("/")[2]
     numbers: dict[str, int] = {"": 0}  # of the materials: one for each texture, called by its name
     of_texture = [numbers.setdefault(name, len(numbers)) for name in found.textures]

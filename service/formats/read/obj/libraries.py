@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from typing import TypeVar
 
 from service.formats.read.references import Finder, Found
 
+T = TypeVar("T")
+AFTER_NAME = re.compile(r"(?<=\.mtl)\s+", re.IGNORECASE)
 COMMENT = re.compile(r"\s+#(?:\s.*)?$")
 
 
@@ -15,10 +19,19 @@ def without_comment(name: str) -> str:
 
 
 def named_libraries(model: str, statement: str, finder: Finder) -> list[tuple[str, Found | None]]:
-    """The libraries that the model names after `mtllib`: one, whose name may contain blanks, or else several."""
+    """The libraries that the model names after `mtllib`."""
+    return readings(statement, lambda name: finder.find(model, name))
+
+
+def readings(statement: str, find: Callable[[str], T | None]) -> list[tuple[str, T | None]]:
+    """What `find` knows of the names after `mtllib`: of one, which may contain blanks, or else of several, each up to
+    its `.mtl`, or else of the words."""
     plain = without_comment(statement)
-    words = plain.split()
-    for name in dict.fromkeys((statement, plain)) if words else ():
-        if (whole := finder.find(model, name)) is not None:
+    for name in dict.fromkeys((statement, plain)) if plain.split() else ():
+        if (whole := find(name)) is not None:
             return [(name, whole)]
-    return [(name, finder.find(model, name)) for name in words]
+    found: list[tuple[str, T | None]] = []
+    for name in AFTER_NAME.split(plain.strip()):
+        whole = find(name) if name else None
+        found += [(name, whole)] if whole is not None else [(word, find(word)) for word in name.split()]
+    return found

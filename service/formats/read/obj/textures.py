@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from service.formats.errors import ParseError
 from service.formats.formats import KINDS, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
 from service.formats.read.obj.mtl import Map
+from service.formats.read.other_images import NAMED, as_png
 from service.formats.read.png_chunks import opened
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes.names import unique
@@ -21,7 +21,7 @@ from service.formats.types import AssetLimits
 
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # by -imfchan; any channel of a grey image is luminance
 PNG, SIXTEEN = b"\x89PNG\r\n\x1a\n", b"\x10"  # how a file begins, and the depth in its header
-FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
+FORMATS = f"PNG, JPEG, WebP, EXR, Radiance HDR, {NAMED}"
 SMALL = 64  # texels of a side are enough to tell a normal map from heights
 BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, at least; of heights it is 0
 
@@ -87,14 +87,14 @@ class Textures:
         image = self._image(found)[1]
         if image is None or sniff(image) not in PILLOW:
             return False
-        opened = _opened(image, found)
+        opened = _opened(image)
         if len(opened.getbands()) < 3:
             return False
         check_size(opened.width, opened.height, self.limits)
         try:
             small = opened.convert("RGB").resize((SMALL, SMALL), Image.Resampling.BOX)
         except (OSError, SyntaxError, ValueError):
-            raise ParseError("is a broken image", found.place) from None
+            return False  # and the image is left out when it is stored
         red, green, blue = np.asarray(small, np.float64).reshape(-1, 3).mean(axis=0) / 255
         return bool(blue - max(red, green) > BLUE)
 
@@ -102,7 +102,7 @@ class Textures:
         image = self._image(found)[1]
         if image is None or sniff(image) not in PILLOW:
             return False
-        opened = _opened(image, found)
+        opened = _opened(image)
         return "A" in opened.getbands() or "transparency" in opened.info
 
     def _image(self, found: Map) -> tuple[str, bytes | None]:
@@ -119,9 +119,15 @@ class Textures:
     def _read(self, path: str, found: Map) -> bytes | None:
         data = self.archive.read(path)
         format = sniff(data, filename=path) if data else None
+        if format is None and data:
+            data = as_png(data, self.limits.max_texels) or data
+            format = sniff(data)
         if format is None or KINDS[format] != "image":
             shown = repr(found.reference[:100])
             self.notes.add(found.place, f"the texture {shown} is not in a supported format ({FORMATS}); left out")
+            return None
+        if format in PILLOW and _opened(data) is None:
+            self.notes.add(found.place, f"the texture {found.reference[:100]!r} is a broken image; left out")
             return None
         return data
 
@@ -136,9 +142,9 @@ class Textures:
             self.notes.add(found.place, "the option -mm is not supported and is ignored")
 
 
-def _opened(data: bytes, found: Map) -> Any:
-    """An image whose header was read, and nothing else of it."""
+def _opened(data: bytes) -> Any:
+    """An image whose header was read, and nothing else of it; None for one that is broken."""
     try:
         return opened(data, list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):
-        raise ParseError("is a broken image", found.place) from None
+        return None
