@@ -7,6 +7,7 @@ import posixpath
 import re
 import sys
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -139,14 +140,16 @@ def _of_mtlx(data: bytes, beside: _Neighbours) -> list[str]:
 
 
 def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:
-    """Layers and images, and what these layers name in turn."""
+    """Layers, MaterialX files and images, and what the former name in turn."""
+    from service.formats.read.materialx.document import named
     from service.formats.read.usd_names import names_in_layer
 
     found: dict[str, None] = {}
     left = [("", data)]
     while left:
         source, layer = left.pop()
-        for name in names_in_layer(layer):
+        names = named(layer) if source.lower().endswith(".mtlx") else (names_in_layer(layer),)
+        for name in chain(*names):
             try:
                 path = beside.find(source, name, place=source or "the USD file")
             except BadInput as error:  # it may be in a variant that is not shown
@@ -155,7 +158,7 @@ def _of_usd(data: bytes, beside: _Neighbours) -> list[str] | None:
             if path is None or path in found:
                 continue
             content = beside.files.read(path)
-            if is_layer := content.startswith((CRATE, USD_TEXT)):
+            if is_layer := content.startswith((CRATE, USD_TEXT)) or path.lower().endswith(".mtlx"):
                 left.append((path, content))
             if is_layer or KINDS.get(sniff(content, filename=path) or "") == "image":
                 found[path] = None

@@ -79,8 +79,8 @@ def lay_out(
         height, width = image.pixels.shape[:2]
         whole = width * height + (level_texels(width, height) if stored in averaged else 0)
         if width * height > room or whole > device_room:
-            left = room if width * height > room else device_room
-            detail = f"has {width} x {height} texels; this server has room for {left} more in a scene"
+            left, setting = (room, " (SUNBOX_MAX_TEXELS)") if width * height > room else (device_room, "")
+            detail = f"has {width} x {height} texels; this server has room for {left} more in a scene{setting}"
             raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
         room, device_room = room - width * height, device_room - whole
     images = {stored: image for stored, (_, image) in wanted.items()}

@@ -4,6 +4,7 @@ Nothing of this folder is imported but there: the library takes 0.2 s and 50 MB.
 
 importer         a file -> a scene's document with its meshes and images as parts, or one mesh
 package          the file: its layers in memory, and the images beside them
+materialx_layer  a MaterialX file -> a layer
 walk             the prims that are shown, and where they stand
 meshes           a mesh -> triangles with normals, colours and texture coordinates
 subdivision      whether it would change the shape of a mesh

@@ -17,14 +17,16 @@ from functools import partial
 from pxr import Sdf, Tf, Usd, UsdUtils, Work
 
 from service.formats.errors import ParseError
-from service.formats.formats import CRATE, USD_LAYERS, USD_TEXT, text
+from service.formats.formats import CRATE, PACKAGES, USD_LAYERS, USD_TEXT, missing, text
 from service.formats.read.archive import Archive
+from service.formats.read.materialx.document import is_standard, read_document
 from service.formats.read.references import Found
 from service.formats.read.scenes.warnings import Warnings
+from service.formats.read.usd.materialx_layer import layer_of
 from service.formats.read.usd_names import WORDS
 from service.formats.types import AssetLimits
 
-PACKAGE = ".usdz"
+PACKAGE, MATERIALX = ".usdz", ".mtlx"
 INSIDE, OUTSIDE = "inside:", "outside:"  # before the path of a file that is not a layer, in the package or not
 SHADERS = (".mdl", ".osl", ".oso", ".glslfx", ".mtlx")  # code, of which the importer of materials speaks
 DEEPEST = 256  # prims within prims: the library calls itself for each, and 20 000 overflow its stack
@@ -70,10 +72,28 @@ class Package:
 
     def _layer(self, name: str) -> Sdf.Layer:
         if name not in self._layers:
-            data = self.data if self.files is None else self.files.read(name)
-            self._layers[name] = _read(data, name)
+            if name.lower().endswith(MATERIALX):
+                self._layers[name] = self._materialx(name)
+            else:
+                self._layers[name] = _read(self.data if self.files is None else self.files.read(name), name)
             self._unread.append(name)
         return self._layers[name]
+
+    def _materialx(self, name: str) -> Sdf.Layer:
+        """The materials of a MaterialX file; none, with a warning, of one that can't be read."""
+        assert self.files is not None
+        try:
+            return layer_of(read_document(name, self.files.read, self._included), name, self.notes)
+        except ParseError as error:
+            self.notes.leave_out(name, f"{error.detail}; what is in it is left out")
+            return Sdf.Layer.CreateAnonymous(".usda")
+
+    def _included(self, source: str, name: str) -> str | None:
+        """The path of a MaterialX file that another one includes."""
+        found = self._located(source, name)
+        if found is None and not is_standard(name):
+            self.notes.add(source, f"it includes {name[:100]!r}, which is not in the upload; it is read without that")
+        return found
 
     def _replaced(self, layer: str, composed: frozenset[str], path: str) -> str:
         """The path that a layer gets instead of its author's; `composed` are those that lead to other layers, by
@@ -83,8 +103,9 @@ class Package:
         if found is not None and (found.lower().endswith(USD_LAYERS) or (path in composed and self._is_layer(found))):
             identifier: str = self._layer(found).identifier
             return identifier
-        if path in composed and not lower.endswith(".mtlx"):
-            what = ALONE if found is None else "which is no USD layer"
+        if path in composed:
+            unread = f"which needs {PACKAGES['mtlx'][0]}" if lower.endswith(MATERIALX) else "which is no USD layer"
+            what = ALONE if found is None else unread
             self.notes.leave_out(
                 layer or path, f"it refers to another file, {path[:100]!r}, {what}; that is left out"
             )
@@ -96,13 +117,15 @@ class Package:
                 layer or path, f"it refers to another file, {path[:100]!r}, {ALONE}; that is left out"
             )
             return ""
-        if lower.endswith(".mtlx"):
+        if lower.endswith(MATERIALX):
             self.notes.add(layer or path, f"the MaterialX file {path[:100]!r} is not read; what is in it is left out")
             return ""
         return OUTSIDE + path[:200]
 
     def _is_layer(self, name: str) -> bool:
         assert self.files is not None
+        if name.lower().endswith(MATERIALX):
+            return "mtlx" not in missing()
         return self.files.read(name).startswith((USD_TEXT, CRATE))
 
     def _located(self, layer: str, path: str) -> str | None:
