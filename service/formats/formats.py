@@ -122,9 +122,7 @@ POINTER = "this is a pointer of Git LFS, and not the file; `git lfs pull` fetche
 OTHER_MODELS = (
     ".3dm", ".abc", ".blend", ".c4d", ".iges", ".igs", ".lwo", ".ma", ".max", ".mb", ".skp", ".sldprt",
 )  # fmt: skip
-OTHER_IMAGES = (
-    ".avif", ".bmp", ".dds", ".gif", ".heic", ".jp2", ".jxl", ".ktx2", ".psd", ".svg", ".tga", ".tif", ".tiff",
-)  # fmt: skip
+UNREAD_IMAGES = (".avif", ".heic", ".jp2", ".jxl", ".ktx2", ".svg")
 UNREAD = "a model in a format that is not read; export it as glTF (.glb)"
 
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.

@@ -1,5 +1,5 @@
-"""The files that a layer of USD names, found without the library that reads it: the command line looks for them
-beside the file before any of it is parsed.
+"""The files that a layer of USD names, and whether it shows anything, found without the library that reads it: the
+command line looks for files beside the layer before any of it is parsed, and the library may not be installed.
 
 A text has them between `@`. A binary layer has every path among its tokens, a list of words that LZ4 compressed
 [OpenUSD, pxr/usd/sdf/crateFile.h].
@@ -20,6 +20,10 @@ WORDS = rb"""
     """
 WORD = re.compile(WORDS, re.DOTALL | re.VERBOSE)
 FILE = re.compile(rb"[^\0]*\.[A-Za-z0-9]{1,8}", re.DOTALL)  # a word that may be the path of a file
+# Kinds of prims that are shown, and paths of other layers, which may have some.
+SHOWN = re.compile(
+    rb"\b(?:Mesh|Sphere|Cube|Cylinder|Cone|Capsule|Plane|PointInstancer|\w+Curves)(?:_1)?\b|\.usd[acz]?\b"
+)
 SECTIONS = 64  # of a binary layer; six are known
 LIST_ENTRY = struct.Struct("<16sqq")  # a section's name, where it begins, and its bytes
 MOST_TOKENS = 16 << 20  # bytes of all tokens; a second of work for each 4 MiB
@@ -37,6 +41,14 @@ def names_in_layer(data: bytes) -> list[str]:
     else:
         return []
     return [decoded(name) for name in dict.fromkeys(found) if FILE.fullmatch(name)]
+
+
+def may_show(data: bytes) -> bool:
+    """False for a layer of materials alone, text or binary; True for any that may show a thing."""
+    try:
+        return SHOWN.search(_tokens(data) if data.startswith(CRATE) else text(data)) is not None
+    except (struct.error, IndexError, ValueError):
+        return True
 
 
 def _tokens(data: bytes) -> bytes:

@@ -6,16 +6,23 @@ import io
 import struct
 import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from service.formats.errors import MissingExtra
+from service.formats.read.usd_names import may_show
+from service.formats.read.zips import importer as zips
+from service.formats.read.zips.importer import read_zip
+from service.formats.types import AssetLimits
 from service.problems import AssetError
 from service.server.assets import AssetStore
 from tests import asset_files as make
 from tests.gltf_files import Gltf
 from tests.mtlx_files import mtlx, surface, value
 from tests.obj_files import TEXTURED, zipped
+from tests.usd_files import usdc
 
 OAK = make.png(np.full((2, 2, 3), (200, 100, 50), np.uint8))
 MTLX = mtlx(surface("gltf_pbr", value("base_color", "1, 0.5, 0", "color3")))
@@ -98,6 +105,28 @@ def test_materials_beside_a_layer_without_a_mesh(store: AssetStore) -> None:
         store.add(zipped({"bricks.usda": BARE, "cover.png": OAK}))
     with pytest.raises(AssetError, match="no triangles"):
         store.add(zipped(files), entry="bricks.usda")
+
+
+def test_without_the_extra_materials_are_taken_from_beside_a_layer_that_shows_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(zips, "find_spec", lambda name: None)
+    limits = AssetLimits()
+    found = read_zip(zipped({"bricks.usda": BARE, "bricks_color.png": OAK}), limits)
+    assert list(found.document["materials"]) == ["bricks"]
+    assert [warning["pointer"] for warning in found.warnings] == ["bricks.usda"]
+    shows = (BARE + b'def Mesh "B" { }', BARE + b'def "A" (references = @a.usdc@) { }', b"PXR-USDC broken")
+    for layer in shows:  # a model is not thrown away for its images
+        with pytest.raises(MissingExtra, match=r"sunbox-server\[usd\]"):
+            read_zip(zipped({"bricks.usda": layer, "bricks_color.png": OAK}), limits)
+    with pytest.raises(MissingExtra, match=r"sunbox-server\[usd\]"):
+        read_zip(zipped({"bricks.usda": BARE, "cover.png": OAK}), limits)
+
+
+@pytest.mark.usd
+def test_a_binary_layer_says_whether_it_shows_anything(tmp_path: Path) -> None:
+    for layer, shows in ((BARE, False), (BARE + b'def Sphere "B" { }', True)):
+        assert may_show(usdc(layer, tmp_path)) == may_show(layer) == shows
 
 
 def test_materialx_beside_a_gltf_without_a_mesh(store: AssetStore) -> None:

@@ -289,7 +289,7 @@ def test_several_models_over_rest(server: Server) -> None:
         ({"IMG_1.png": OAK}, "the zip holds IMG_1.png; no model"),
         ({"IMG_1.png": OAK}, "no images whose names say what they are"),
         ({"IMG_1.png": OAK}, "an image that is used by itself is uploaded without a zip"),
-        ({"oak_color.TIF": b"II*"}, "oak_color.TIF is an image in a format that is not read (PNG, JPEG"),
+        ({"oak_color.TIF": b"II*"}, "oak_color.TIF is not an image in a supported format (PNG, JPEG"),
         ({"in.zip": zipped({"a.obj": TEXTURED})}, "the zip holds in.zip; a zip within a zip is not opened"),
         ({"__MACOSX/a.obj": TEXTURED}, "the zip is empty"),
         ({"a.gltf": scattered()[0], "oak.png": OAK}, "'scene.bin', which is not there: the zip holds a.gltf"),

@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from service.formats.errors import LAYER, ParseError
-from service.formats.formats import KINDS, sniff
+from service.formats.formats import sniff
 from service.formats.read.image import parse_image
+from service.formats.read.other_images import NAMED, readable
 from service.formats.read.references import Finder, Found, is_absolute
 from service.formats.surface.trees import Tree, Unsupported
 from service.formats.types import AssetLimits, Floats, ImageData
 
-FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
 MOST_BYTES = 1 << 30  # of the decoded images of one upload
 
 
@@ -26,6 +26,7 @@ class Images:
     finder: Finder
     read: Callable[[str], bytes]
     limits: AssetLimits
+    _images: dict[str, bytes | None] = field(default_factory=dict)
     _decoded: dict[tuple[str, str], ImageData] = field(default_factory=dict)  # by path and layer
     _bytes: int = 0
 
@@ -39,11 +40,15 @@ class Images:
             raise Unsupported(f"the image {shown} is not a path inside the upload")
         if found is None:
             raise Unsupported(f"the image {shown} is not in the upload; a zip has a .mtlx file and its images")
-        path = found.path
-        format = sniff(self.read(path), filename=path)
-        if format is None or KINDS[format] != "image":
-            raise Unsupported(f"the image {shown} is not in a supported format ({FORMATS})")
+        if self.image(found.path) is None:
+            raise Unsupported(f"the image {shown} is not in a supported format ({NAMED})")
         return found
+
+    def image(self, path: str) -> bytes | None:
+        """The image of a file in a format that textures have; None for any other file."""
+        if path not in self._images:
+            self._images[path] = readable(self.read(path), self.limits.max_texels, path)
+        return self._images[path]
 
     def check_layer(self, path: str, layer: str) -> None:
         """Raise Unsupported where an image has no such layer."""
@@ -59,9 +64,10 @@ class Images:
         large."""
         key = path, layer
         if key not in self._decoded:
-            data = self.read(path)
+            data = self.image(path)
+            assert data is not None  # `located` has looked
             format = sniff(data, filename=path)
-            assert format is not None  # `located` has looked
+            assert format is not None
             image = parse_image(format, data, self.limits, layer)
             self._bytes += image.pixels.nbytes
             if self._bytes > MOST_BYTES:

@@ -154,7 +154,9 @@ class Values:
         key = image.texts["file"], repr(settings)
         if key not in self._names:
             file = image.texts["file"]
-            asset = self.files.add(self.images.read(file), file)
+            data = self.images.image(file)
+            assert data is not None  # it was located
+            asset = self.files.add(data, file)
             self._names[key] = self._named(file, {"asset": asset, **settings})
         return self._names[key], [float(f"{one:.7g}") for one in by.tolist()], channels
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from service.formats.formats import KINDS, sniff
+from service.formats.formats import sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW, check_size
 from service.formats.read.obj.mtl import Map
-from service.formats.read.other_images import NAMED, as_png
+from service.formats.read.other_images import NAMED, readable
 from service.formats.read.png_chunks import opened
 from service.formats.read.raw_mesh import MAX_COORDINATE
 from service.formats.read.scenes.names import unique
@@ -21,7 +21,6 @@ from service.formats.types import AssetLimits
 
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # by -imfchan; any channel of a grey image is luminance
 PNG, SIXTEEN = b"\x89PNG\r\n\x1a\n", b"\x10"  # how a file begins, and the depth in its header
-FORMATS = f"PNG, JPEG, WebP, EXR, Radiance HDR, {NAMED}"
 SMALL = 64  # texels of a side are enough to tell a normal map from heights
 BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, at least; of heights it is 0
 
@@ -117,16 +116,12 @@ class Textures:
         return path, self._found[path]
 
     def _read(self, path: str, found: Map) -> bytes | None:
-        data = self.archive.read(path)
-        format = sniff(data, filename=path) if data else None
-        if format is None and data:
-            data = as_png(data, self.limits.max_texels) or data
-            format = sniff(data)
-        if format is None or KINDS[format] != "image":
+        data = readable(self.archive.read(path), self.limits.max_texels, path)
+        if data is None:
             shown = repr(found.reference[:100])
-            self.notes.add(found.place, f"the texture {shown} is not in a supported format ({FORMATS}); left out")
+            self.notes.add(found.place, f"the texture {shown} is not in a supported format ({NAMED}); left out")
             return None
-        if format in PILLOW and _opened(data) is None:
+        if sniff(data, filename=path) in PILLOW and _opened(data) is None:
             self.notes.add(found.place, f"the texture {found.reference[:100]!r} is a broken image; left out")
             return None
         return data

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, OTHER_MODELS, UNREAD, sniff
+from service.formats.formats import OTHER_MODELS, UNREAD, sniff
 from service.formats.read.archive import Archive
 from service.formats.read.image import PILLOW
-from service.formats.read.obj.textures import FORMATS
+from service.formats.read.other_images import ENDINGS, NAMED, readable
 from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -41,11 +41,13 @@ def read_texture_sets(archive: Archive, limits: AssetLimits, nothing: str) -> Sc
     notes, files = Warnings(names_files=True), PartFiles()
     note = by_note(archive)
     others = [path for path in archive.names if note is None or path != note[0]]
-    images = {path: data for path in others if (data := _image(archive, path, notes)) is not None}
+    images = {path: data for path in others if (data := _image(archive, path, limits, notes)) is not None}
     sets = texture_sets(images, notes)
     if not sets:
         tiles = f". {UDIM}, and it has none that is tile {FIRST_TILE}" if notes.has(UDIM) else ""
-        raise ParseError(f"{nothing}{tiles}")
+        broken = [each for each in notes.document() if each["pointer"].lower().endswith(ENDINGS)]
+        told = f"; {broken[0]['pointer'][:100]} is {broken[0]['detail']}" if broken else ""
+        raise ParseError(f"{nothing}{tiles}{told}")
     if len(sets) > MOST_MATERIALS:
         raise ParseError(f"it holds images of {len(sets)} materials; {MOST_MATERIALS} are allowed")
     textures = _Textures(images, files, limits)
@@ -64,15 +66,13 @@ def read_texture_sets(archive: Archive, limits: AssetLimits, nothing: str) -> Sc
     return SceneFile(document, files.parts, notes.document(), 0, False)
 
 
-def _image(archive: Archive, path: str, notes: Warnings) -> bytes | None:
+def _image(archive: Archive, path: str, limits: AssetLimits, notes: Warnings) -> bytes | None:
     if path.lower().endswith(OTHER_MODELS):
         notes.add(path, f"{UNREAD}; left out")
         return None
-    data = archive.read(path)
-    format = sniff(data, filename=path) if data else None
-    if format is None or KINDS[format] != "image":
-        notes.add(path, f"not an image in a supported format ({FORMATS}); left out")
-        return None
+    data = readable(archive.read(path), limits.max_texels, path)
+    if data is None:
+        notes.add(path, f"not an image in a supported format ({NAMED}); left out")
     return data
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from service.colorimetry import decode_srgb, encode_srgb
 from service.formats.errors import LAYER, ParseError
-from service.formats.formats import KINDS, sniff
+from service.formats.formats import sniff
 from service.formats.images import encode
 from service.formats.read.image import parse_image
+from service.formats.read.other_images import readable
 from service.formats.read.png_chunks import opened
 from service.formats.read.scenes.names import unique
 from service.formats.read.scenes.part_files import PartFiles
@@ -115,11 +116,10 @@ class Textures:
             what = "names no file" if not path else f"refers to {shown}, which is not in this file"
             self.notes.add(pointer, f"the texture {what}; the surface is shown without it")
             return None
-        format = sniff(data) if data else None
-        if format is None or KINDS[format] != "image":
+        image = readable(data, self.limits.max_texels)
+        if image is None:
             self.notes.add(pointer, f"the image {posixpath.basename(path)[:60]!r} is in no format that is read")
-            return None
-        return data
+        return image
 
     def _layer(self, picture: Picture, data: bytes) -> str:
         """The layer that a picture names; "", with a warning, where its image has none of that name."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from service.formats import formats
 from service.formats.errors import ParseError
-from service.formats.formats import KINDS, MAGIC, OTHER_IMAGES, OTHER_MODELS, SUFFIXES, UNREAD, USD_LAYERS
+from service.formats.formats import KINDS, MAGIC, OTHER_MODELS, SUFFIXES, UNREAD, UNREAD_IMAGES, USD_LAYERS
 from service.formats.read.archive import Archive, listed
-from service.formats.read.obj.textures import FORMATS
+from service.formats.read.other_images import ENDINGS, NAMED
 from service.formats.read.references import Finder
 
 MODELS = ("gltf", "glb", "obj", "ply", "stl", "usd", *formats.MODELS, "3mf")
@@ -83,13 +83,14 @@ def nothing(archive: Archive, found: Contents) -> str:
     named = "and no images whose names say what they are, such as wood_color.png and wood_normal.png"
     images = f", {named}; an image that is used by itself is uploaded without a zip"
     others = [name for name in archive.names if name.lower().endswith(OTHER_MODELS)]
-    pictures = [name for name in archive.names if name.lower().endswith(OTHER_IMAGES)]
+    pictures = [name for name in archive.names if name.lower().endswith(UNREAD_IMAGES)]
+    has_others = any(name.lower().endswith(ENDINGS) for name in archive.names)
     unread = f"; {listed(others[:1])} is {UNREAD}" if others else ""
     if pictures:
-        unread += f"; {listed(pictures[:1])} is an image in a format that is not read ({FORMATS} are)"
+        unread += f"; {listed(pictures[:1])} is an image in a format that is not read ({NAMED} are)"
     if any(name.lower().endswith(STEP) for name in archive.names):
         unread = "; a STEP file is read by itself: upload it without the zip"
-    what = f"no model ({READ}){images if 'image' in kinds else ''}"
+    what = f"no model ({READ}){images if 'image' in kinds or has_others else ''}"
     return f"the zip holds {listed(archive.names)}; {what}{unread}"
 
 

@@ -17,6 +17,7 @@ from service.formats.read.obj.importer import read_obj_scene, read_ply_scene
 from service.formats.read.obj_mesh import read_obj
 from service.formats.read.raw_mesh import RawMesh
 from service.formats.read.texture_sets.importer import read_texture_sets
+from service.formats.read.usd_names import may_show
 from service.formats.read.zips.contents import MATERIALX, PACKAGE, Contents, chosen, contents_of, nothing
 from service.formats.read.zips.meshes import read_stl_scene, read_zipped_mesh
 from service.formats.types import AssetLimits, Pose, SceneFile
@@ -38,6 +39,13 @@ def read_zip(
         if entry is not None or path is None:
             raise
         return _beside(archive, found, path, limits)
+    except MissingExtra as missing:
+        if entry is not None or path is None or found.models.get(path) != "usd" or may_show(archive.read(path)):
+            raise
+        try:
+            return _beside(archive, found, path, limits)
+        except NoTriangles:
+            raise missing from None
 
 
 def read_zip_as_mesh(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
