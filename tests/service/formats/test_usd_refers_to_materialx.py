@@ -127,6 +127,17 @@ def test_nodes_that_read_each_other_end(store: AssetStore) -> None:
     assert any("not supported" in each["detail"] for each in found.warnings)
 
 
+def test_the_nodes_of_all_materials_are_bounded(store: AssetStore) -> None:
+    many = graph(*(node("constant", f"c{k}", "float") for k in range(60)),
+                 *(node("add", f"a{k}", "float", wire("in1", f"a{k - 1}" if k else "c0", "float"),
+                        wire("in2", f"c{k % 60}", "float")) for k in range(500)), out="a499 float")  # fmt: skip
+    rough = '<input name="specular_roughness" type="float" nodegraph="NG" output="out"/>'
+    text = mtlx(many, *(surface("standard_surface", rough, name=f"M{k}") for k in range(25)))
+    look = 'def "Look" (references = @looks/looks.mtlx@</MaterialX/Materials/M0>) { }'
+    _, found = worn(store, scene(look), **{"looks/looks.mtlx": text})
+    assert any("more than the 10000 nodes allowed" in each["detail"] for each in found.warnings)
+
+
 def test_the_command_line_takes_them_and_their_images_along(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

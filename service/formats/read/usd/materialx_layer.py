@@ -11,11 +11,12 @@ from typing import Any
 
 from pxr import Gf, Sdf, Tf, Usd, UsdShade
 
+from service.formats.errors import ParseError
 from service.formats.read.scenes.warnings import Warnings
 
 ROOT = Sdf.Path("/MaterialX")
 MATERIALS = ROOT.AppendChild("Materials")
-MOST_PRIMS = 100_000
+MOST_PRIMS = 10_000  # of all materials, each of which has its own: they take some seconds
 # Types of MaterialX in USD, and the numbers of each; others, such as surfaceshader, are only connected.
 VALUES = Sdf.ValueTypeNames
 TYPES = {
@@ -29,7 +30,7 @@ OUTPUTS = {"surfaceshader": "surface", "displacementshader": "displacement", "vo
 
 
 def layer_of(document: Any, name: str, notes: Warnings) -> Sdf.Layer:
-    """The layer of a document of the MaterialX library's; `name` is its file's, in warnings."""
+    """The layer of a document of the MaterialX library's; `name` is its file's, in warnings. Raises ParseError."""
     return _Writer(name, notes).written(document)
 
 
@@ -50,18 +51,20 @@ class _Writer:
                 if (output := OUTPUTS.get(given.getType())) is not None:
                     made = material.CreateOutput(f"mtlx:{output}", VALUES.Token)
                     self._connect(made, given, material.GetPath())
-            while self.left and len(self.made) < MOST_PRIMS:
-                self._fill(*self.left.pop(), material.GetPath())
+            while self.left:
+                self._fill(*self.left.pop())
+                if len(self.made) > MOST_PRIMS:
+                    raise ParseError(f"its materials read more than the {MOST_PRIMS} nodes allowed")
         return self.layer
 
-    def _fill(self, path: Sdf.Path, element: Any, material: Sdf.Path) -> None:
+    def _fill(self, path: Sdf.Path, element: Any) -> None:
         """The inputs of a node, or those of a graph and its outputs."""
         is_graph = element.getCategory() == "nodegraph"
         prim = (UsdShade.NodeGraph if is_graph else UsdShade.Shader).Get(self.stage, path)
         for given in element.getInputs():
             type, _ = TYPES.get(given.getType(), (VALUES.Token, 0))
             made = prim.CreateInput(given.getName(), type)
-            if not self._connect(made, given, material if path.GetParentPath() == material else path.GetParentPath()):
+            if not self._connect(made, given, path.GetParentPath()):
                 self._set(made, given)
         if is_graph:
             for given in element.getOutputs():
@@ -75,14 +78,14 @@ class _Writer:
             graph = UsdShade.NodeGraph.Get(self.stage, scope)
             source = graph.CreateInput(given.getInterfaceName(), made.GetTypeName()) if graph else None
             return source is not None and bool(made.ConnectToSource(source))
-        above = given.getParent().getParent()  # the graph or the document that the node is in
-        above = given.getParent() if given.getCategory() == "output" else above
+        is_output = given.getCategory() == "output"
+        above = given.getParent() if is_output else given.getParent().getParent()  # a graph or the document
         element = None
         if given.getNodeGraphString():
             element = above.getDocument().getNodeGraph(given.getNodeGraphString())
         elif given.getNodeName():
             element = above.getNode(given.getNodeName())
-        elif given.getOutputString() and (output := above.getOutput(given.getOutputString())) is not None:
+        elif not is_output and (output := above.getOutput(given.getOutputString())) is not None:
             return self._connect(made, output, scope)
         if element is None:
             return False
