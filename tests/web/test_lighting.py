@@ -75,8 +75,8 @@ def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
     assert editor.page.locator("#messages button").count() == 1, "nothing to do about it but to close it"
     assert "false" not in editor.text("#messages")
 
-    file.tree["materials"][1]["alphaMode"] = "HALF"
+    file.tree["nodes"][0]["mesh"] = 7
     editor.drop("#stage", {"bad.glb": file.glb()})
     editor.wait("the refusal", lambda: "bad.glb could not be used" in editor.text("#messages"))
     refusal = editor.page.inner_text("#messages .refusal")
-    assert "Material 2, alphaMode must be OPAQUE, MASK or BLEND, not 'HALF'." in refusal, refusal
+    assert "Node 1, mesh refers to " in refusal, refusal
