@@ -70,23 +70,54 @@ def test_a_texture(path: str, value: Any, place: str, detail: str) -> None:
     assert said.startswith(detail) and said.endswith("; the texture is left out")
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("materials/0/pbrMetallicRoughness/roughnessFactor", None),
-        ("materials/0/pbrMetallicRoughness/metallicFactor", 2),
-        ("materials/0/pbrMetallicRoughness/baseColorFactor", [1, 0.5, 1]),
-        ("materials/0/normalTexture", None),
-        ("meshes/0/primitives/0/material", -1),
-        ("meshes/0/primitives/0/material", 5),
-    ],
+MATERIAL, PBR = "materials/0", "materials/0/pbrMetallicRoughness"
+GLASS, GLOW = (
+    f"{MATERIAL}/extensions/KHR_materials_transmission",
+    f"{MATERIAL}/extensions/KHR_materials_emissive_strength",
 )
-def test_a_material(path: str, value: Any) -> None:
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "shown", "detail"),
+    [
+        (f"{PBR}/roughnessFactor", None, {"roughness": 1}, "must be a finite number, not null; 1 is used instead"),
+        (f"{PBR}/roughnessFactor", 1.0000001, {"roughness": 1}, "must be from 0 to 1, not 1.0000001; 1 is used"),
+        (f"{PBR}/metallicFactor", 2, {"metallic": 1}, "must be from 0 to 1, not 2; 1 is used instead"),
+        (f"{PBR}/metallicFactor", -0.5, {"metallic": 0}, "must be from 0 to 1, not -0.5; 0 is used instead"),
+        (f"{PBR}/baseColorFactor", [1, 0.5, 1], {}, "must be 4 numbers, not [1, 0.5, 1]; 1 0.5 1 1 are used instead"),
+        (f"{PBR}/baseColorFactor", "red", {}, "must be 4 numbers, not 'red'; 1 1 1 1 are used instead"),
+        (f"{PBR}/baseColorFactor", [1, -1, 0.5, 1], {}, "[1.0, -1.0, 0.5, 1.0]; 1 0 0.5 1 are used"),
+        (f"{MATERIAL}/normalTexture", None, {}, "must be an object, not null; it is left out"),
+        (f"{MATERIAL}/alphaMode", "blend", {}, "must be OPAQUE, MASK or BLEND, not 'blend'; BLEND is used instead"),
+        (f"{MATERIAL}/alphaMode", 7, {}, "must be a string, not 7; OPAQUE is used instead"),
+        (f"{MATERIAL}/doubleSided", "true", {}, "must be true or false, not 'true'; false is used instead"),
+        (f"{MATERIAL}/name", 3, {}, "must be a string, not 3"),
+        (f"{GLASS}", None, {}, "must be an object, not null; it is left out"),
+        (f"{GLASS}/transmissionFactor", 1.5, {"transmission": 1}, "must be from 0 to 1, not 1.5; 1 is used instead"),
+        (f"{GLOW}/emissiveStrength", 1e30, {"emission": 1e20}, "must be at most 1e+20: 1e+30; 1e+20 is used"),
+    ],
+)  # fmt: skip
+def test_a_member_of_a_material_costs_no_other(path: str, value: Any, shown: dict[str, Any], detail: str) -> None:
     file = textured()
+    file.tree["materials"][0]["emissiveFactor"] = [1, 1, 1]
     put(file, path, value)
     scene = read(file)
+    (material,) = scene.document["materials"].values()
+    said = noted(scene)
+    place = f"/{MATERIAL}/emissiveFactor" if "Strength" in path else f"/{path}"
+    assert detail in said[place], said
+    assert "texture" in material["base_color"], "which has nothing to do with it"
+    assert shown.items() <= material.items()
+
+
+@pytest.mark.parametrize("value", [-1, 5])
+def test_a_material_that_does_not_exist(value: int) -> None:
+    file = textured()
+    put(file, "meshes/0/primitives/0/material", value)
+    scene = read(file)
     assert len(scene.document["shapes"]) == 1
-    assert noted(scene)[f"/{path}"].endswith("; a grey material is shown in its place")
+    said = noted(scene)["/meshes/0/primitives/0/material"]
+    assert said.endswith("; a grey material is shown in its place")
 
 
 @pytest.mark.parametrize("light", [{"type": "ambient"}, {"type": "point", "intensity": -1}, None])

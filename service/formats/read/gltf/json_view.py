@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.formats.errors import ParseError
+from service.formats.read.scenes.warnings import Warnings
 from service.formats.types import BRIGHTEST, LARGEST
 from service.problems import escaped
 
@@ -33,7 +34,10 @@ class JsonView:
         return ParseError(detail, self.at(name))
 
     def object(self, name: str) -> JsonView | None:
-        return JsonView(self.value[name], self.at(name)) if name in self.value else None
+        return self._inner(name) if name in self.value else None
+
+    def _inner(self, name: str) -> JsonView | None:
+        return JsonView(self.value[name], self.at(name))
 
     def need(self, name: str) -> JsonView:
         found = self.object(name)
@@ -62,7 +66,7 @@ class JsonView:
         value = number(self.value.get(name, default), self.at(name))
         if not low <= value <= high:
             limits = f"at least {low:g}" if high == math.inf else f"from {low:g} to {high:g}"
-            raise self.error(name, f"must be {limits}, not {value:g}")
+            raise self.error(name, f"must be {limits}, not {value:.9g}")
         return value
 
     def numbers(self, name: str, default: tuple[float, ...], most: float = LARGEST) -> tuple[float, ...]:
@@ -101,6 +105,76 @@ class JsonView:
         if not isinstance(found, str):
             raise self.error(name, f"must be a string, not {shown(found)}")
         return found
+
+
+class LenientView(JsonView):
+    """An object of which no member costs the others: what can't be used has its default, and a number out of range
+    the nearest one within. Each is noted."""
+
+    def __init__(self, value: Any, pointer: str, notes: Warnings) -> None:
+        super().__init__(value, pointer)
+        self.notes = notes
+
+    def _inner(self, name: str) -> JsonView | None:
+        if isinstance(self.value[name], dict):
+            return LenientView(self.value[name], self.at(name), self.notes)
+        self.notes.add(self.at(name), f"must be an object, not {shown(self.value[name])}; it is left out")
+        return None
+
+    def number(self, name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
+        try:
+            return super().number(name, default, low, high)
+        except ParseError as error:
+            value = self.value[name]
+            is_number = type(value) in NUMBERS and abs(value) < math.inf
+            return float(self._instead(error, min(max(value, low), high) if is_number else default))
+
+    def numbers(self, name: str, default: tuple[float, ...], most: float = LARGEST) -> tuple[float, ...]:
+        try:
+            return super().numbers(name, default, most)
+        except ParseError as error:
+            self._instead(error, default)
+            return default
+
+    def color(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        found = self.value.get(name)
+        if isinstance(found, list) and len(found) == 3 and len(default) == 4:
+            self._instead(self.error(name, f"must be 4 numbers, not {shown(found)}"), [*found, 1])
+            return (*LenientView({name: found}, self.pointer, self.notes).color(name, default[:3]), 1.0)
+        try:
+            return super().color(name, default)
+        except ParseError as error:  # `numbers` gives none: some are negative
+            used = tuple(max(value, 0.0) for value in self.numbers(name, default))
+            self._instead(error, used)
+            return used
+
+    def radiance(self, name: str, default: tuple[float, ...], scale: float) -> list[float]:
+        try:
+            return super().radiance(name, default, scale)
+        except ParseError as error:
+            self._instead(error, BRIGHTEST)
+            return [min(scale * value, BRIGHTEST) for value in self.color(name, default)]
+
+    def flag(self, name: str, default: bool = False) -> bool:
+        try:
+            return super().flag(name, default)
+        except ParseError as error:
+            self.notes.add(error.pointer, f"{error.detail}; {str(default).lower()} is used instead")
+            return default
+
+    def text(self, name: str, default: str = "") -> str:
+        try:
+            return super().text(name, default)
+        except ParseError as error:
+            self.notes.add(error.pointer, f"{error.detail}; {default or 'none'} is used instead")
+            return default
+
+    def _instead(self, error: ParseError, used: Any) -> Any:
+        values = [f"{value:g}" if isinstance(value, int | float) else shown(value) for value in
+                  (used if isinstance(used, list | tuple) else [used])]  # fmt: skip
+        verb = "are" if len(values) > 1 else "is"
+        self.notes.add(error.pointer, f"{error.detail}; {' '.join(values)} {verb} used instead")
+        return used
 
 
 def whole(value: Any, pointer: str, low: int = 0) -> int:

@@ -115,7 +115,10 @@ def _ior(read: MaterialReader, owner: JsonView) -> float:
 def _alpha_mode(read: MaterialReader, owner: JsonView) -> float:
     mode = owner.text("alphaMode", "OPAQUE")
     if mode not in MODES:
-        raise owner.error("alphaMode", f"must be OPAQUE, MASK or BLEND, not {mode[:40]!r}")
+        meant = mode.upper() if mode.upper() in MODES else "OPAQUE"
+        detail = f"must be OPAQUE, MASK or BLEND, not {mode[:40]!r}; {meant} is used instead"
+        read.notes.add(owner.at("alphaMode"), detail)
+        return MODES[meant]
     return MODES[mode]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from service.formats.errors import ParseError
 from service.formats.read.gltf.document import REFUSALS, GltfDocument
-from service.formats.read.gltf.json_view import JsonView
+from service.formats.read.gltf.json_view import JsonView, LenientView
 from service.formats.read.gltf.material_inputs import MaterialInputs
 from service.formats.read.gltf.material_reader import MaterialReader
 from service.formats.read.gltf.specular_glossiness import converted
@@ -63,7 +63,8 @@ class Materials:
         """The material of a primitive; where it names none, or one that does not exist, one that is all defaults."""
         if "material" in primitive:
             try:
-                return self.file.follow(primitive, "material", "materials")
+                found = self.file.follow(primitive, "material", "materials")
+                return LenientView(found.value, found.pointer, self.notes)
             except ParseError as error:
                 self.notes.add(error.pointer, f"{error.detail}; {GREY}")
         return JsonView({}, "")
