@@ -171,3 +171,15 @@ def test_bodies_with_two_radii_and_an_opacity(store: AssetStore) -> None:
         assert found.bounds is not None and found.bounds[1][2] == pytest.approx(extent, abs=1e-6)
         (shape,) = found.document["shapes"]
         assert shape["type"] == ("cylinder" if top == 1 else "mesh")
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [('string inputs:roughness = "0.9"', "roughness", 0.5), ('token inputs:opacityMode = "x"', "opacityMode", None)],
+)
+def test_words_in_place_of_a_number_are_told(store: AssetStore, line: str, name: str, value: float | None) -> None:
+    found = scene(store, material("Look", line) + mesh("S", "rel material:binding = </Look>"))
+    assert found.document["materials"]["Look"].get(name) == value
+    assert (f"/Look/S.inputs:{name}", "the parameter has its default") == (
+        told(found)[0][0], told(found)[0][1].partition("; ")[2],
+    )  # fmt: skip

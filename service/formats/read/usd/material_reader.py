@@ -72,8 +72,12 @@ class Reader(PlainInputs):
 
     def given(self, name: str, default: Default) -> Given | None:
         found = self.surface.input(name)
+        if isinstance(found, str):
+            if found not in MODES:
+                self.warn(name, f"must not be {found[:40]!r}; the parameter has its default")
+            return MODES.get(found)
         if not isinstance(found, Node):
-            return MODES.get(found, 0.0) if isinstance(found, str) else found
+            return found
         own = self.surface.own(name)  # for a connection that cannot be used
         if isinstance(default, tuple):
             return self._read(found, "color", own if isinstance(own, tuple) and len(own) >= 3 else default)
