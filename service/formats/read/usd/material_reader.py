@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from service.formats.read.scenes.warnings import Warnings
 from service.formats.read.usd.networks import MOST_STEPS, Node
@@ -75,9 +75,9 @@ class Reader(PlainInputs):
         if isinstance(found, str):
             if found not in MODES:
                 self.warn(name, f"must not be {found[:40]!r}; the parameter has its default")
-            return MODES.get(found)
+            found = MODES.get(found)
         if not isinstance(found, Node):
-            return found
+            return cast("Given | None", found)
         own = self.surface.own(name)  # for a connection that cannot be used
         if isinstance(default, tuple):
             return self._read(found, "color", own if isinstance(own, tuple) and len(own) >= 3 else default)
