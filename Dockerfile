@@ -5,7 +5,7 @@
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data sunbox
 #   docker run --rm --init --read-only --cap-drop ALL --security-opt no-new-privileges \
 #     -p 127.0.0.1:8000:8000 -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
-# With any of these extras: usd (USD files), models (FBX, COLLADA, 3DS, X3D, 3MF), cad (STEP), ray (the nodes of a cluster,
+# With any of these extras: usd (USD files), models (FBX, COLLADA, 3DS, X3D), cad (STEP), ray (the nodes of a cluster,
 # docs/scaling.md), plot (figures of `sunbox bsdf`) and ffmpeg (animations as .mp4):
 #   docker build --build-arg EXTRAS="usd ffmpeg" -t sunbox .
 # With the kernels of the processor that builds it, which take 2 min: docker build --build-arg WARM=1 -t sunbox .

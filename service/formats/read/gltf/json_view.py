@@ -125,7 +125,7 @@ class LenientView(JsonView):
         try:
             return super().number(name, default, low, high)
         except ParseError as error:
-            value = self.value[name]
+            value = self.value.get(name, default)
             is_number = type(value) in NUMBERS and abs(value) < math.inf
             return float(self._instead(error, min(max(value, low), high) if is_number else default))
 
